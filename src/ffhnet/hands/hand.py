@@ -1,0 +1,202 @@
+"""`Hand`: everything the other rooms need to know of a hand, from its TOML and MJCF."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+import trimesh
+from jaxtyping import Float
+from torch import Tensor
+
+from ffhnet.errors import HandError
+from ffhnet.geometry.rotations import matrix_from_euler_xyz
+from ffhnet.geometry.transforms import invert, make_transform
+from ffhnet.hands.kinematics import KinematicTree, read_mjcf
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+DEFAULT_HAND = "dlr_hit_ii"
+
+
+@dataclass(frozen=True)
+class ClosingMotion:
+    """How the fingers close (section IV-B, "closing primitive").
+
+    Attributes:
+        moves: for each joint, whether it closes or holds its pre-shape.
+        speed: rad/s of the closing joints' targets.
+        lead: rad that a target may be ahead of its joint; with the torque limit it decides the squeeze.
+        duration: s of closing.
+        squeeze: s for which the last targets are kept before the lift.
+    """
+
+    moves: Float[np.ndarray, " J"]
+    speed: float
+    lead: float
+    duration: float
+    squeeze: float
+
+
+@dataclass(frozen=True)
+class Hand:
+    """A hand: kinematics, palm frame, eigengrasps and closing motion.
+
+    Attributes:
+        name: the hand's name, as in files and weights.
+        mjcf: path of the MuJoCo model.
+        joint_names: the actuated joints in the order of every joint array.
+        T_root_palm: pose of the palm frame in the hand's root frame.
+        eigengrasp_origin: joint angles at all weights zero, rad.
+        eigengrasps: E directions in joint space, rad (section IV-B.2).
+        closing: the closing motion.
+    """
+
+    name: str
+    mjcf: Path
+    joint_names: tuple[str, ...]
+    T_root_palm: Float[np.ndarray, "4 4"]
+    eigengrasp_origin: Float[np.ndarray, " J"]
+    eigengrasps: Float[np.ndarray, "E J"]
+    closing: ClosingMotion
+
+    @cached_property
+    def tree(self) -> KinematicTree:
+        """Bodies, shapes and fingertips, read from the MJCF."""
+        return read_mjcf(self.mjcf)
+
+    @cached_property
+    def lower(self) -> Float[np.ndarray, " J"]:
+        """Lower joint limits, rad."""
+        return np.array([self.tree.joints[name].lower for name in self.joint_names])
+
+    @cached_property
+    def upper(self) -> Float[np.ndarray, " J"]:
+        """Upper joint limits, rad."""
+        return np.array([self.tree.joints[name].upper for name in self.joint_names])
+
+    @property
+    def num_joints(self) -> int:
+        """Number of actuated joints."""
+        return len(self.joint_names)
+
+    def body_poses(self, joints: Float[Tensor, "B J"]) -> Float[Tensor, "B L 4 4"]:
+        """T_palm_body of every link for batched joint angles (rad)."""
+        T_palm_root = torch.as_tensor(invert(self.T_root_palm), dtype=joints.dtype, device=joints.device)
+        return T_palm_root @ self.tree.body_poses(joints, self.joint_names)
+
+    def fingertips(self, joints: Float[Tensor, "B J"]) -> Float[Tensor, "B F 3"]:
+        """Positions of the fingertips (the MJCF's sites, in its order) in the palm frame, metres."""
+        poses = self.body_poses(joints)
+        tips = [
+            poses[:, site.body, :3, :3] @ torch.as_tensor(site.position, dtype=joints.dtype)
+            + poses[:, site.body, :3, 3]
+            for site in self.tree.sites
+        ]
+        return torch.stack(tips, dim=1)
+
+    def root_pose(
+        self, rotation: Float[np.ndarray, "3 3"], position: Float[np.ndarray, "3"]
+    ) -> Float[np.ndarray, "4 4"]:
+        """T_frame_root of the hand whose palm stands at the given pose in some frame."""
+        return make_transform(rotation, position) @ invert(self.T_root_palm)
+
+    def open(self, joints: Float[np.ndarray, "*batch J"]) -> Float[np.ndarray, "*batch J"]:
+        """The same grasps with the closing joints at their lower limits: the hand as it approaches."""
+        return np.where(self.closing.moves > 0, self.lower, joints)
+
+    def shape(self, joints: Float[np.ndarray, " J"]) -> trimesh.Trimesh:
+        """One mesh of the hand's collision shapes in the palm frame, for pictures."""
+        poses = self.body_poses(torch.as_tensor(joints, dtype=torch.float64)[None])[0].numpy()
+        parts = []
+        for geom in self.tree.geoms:
+            part = _primitive(geom.type, geom.size)
+            part.apply_transform(poses[geom.body] @ geom.T_body_geom)
+            parts.append(part)
+        return trimesh.util.concatenate(parts)
+
+
+def _primitive(kind: str, size: tuple[float, ...]) -> trimesh.Trimesh:
+    """A mesh of MuJoCo's primitive, centred, long axis z."""
+    if kind == "box":
+        return trimesh.creation.box(2 * np.array(size))
+    if kind == "sphere":
+        return trimesh.creation.icosphere(radius=size[0])
+    if kind == "cylinder":
+        return trimesh.creation.cylinder(radius=size[0], height=2 * size[1])
+    capsule = trimesh.creation.capsule(radius=size[0], height=2 * size[1], count=[24, 24])
+    return capsule.apply_translation(-capsule.bounds.mean(axis=0))
+
+
+@lru_cache
+def load_hand(name_or_toml: str = DEFAULT_HAND) -> Hand:
+    """A built-in hand by name, or any hand by the path of its TOML. Raises HandError."""
+    folder = Path(__file__).parent
+    path = Path(name_or_toml)
+    if path.suffix != ".toml":
+        path = folder / name_or_toml / "hand.toml"
+        if not path.is_file():
+            known = ", ".join(sorted(p.parent.name for p in folder.glob("*/hand.toml")))
+            raise HandError(f"unknown hand '{name_or_toml}': wanted one of {known}, or a .toml file")
+    try:
+        description = tomllib.loads(path.read_text())
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise HandError(f"cannot read the hand description {path}: {error}") from error
+    try:
+        hand = _from_description(description, path.parent)
+    except (KeyError, TypeError, ValueError) as error:
+        raise HandError(
+            f"{path}: a field is missing or malformed ({type(error).__name__}: {error})"
+        ) from error
+    _check(hand)
+    return hand
+
+
+def _from_description(description: dict[str, Any], folder: Path) -> Hand:
+    joint_names = tuple(description["joint_order"])
+    closing = description["closing"]
+    unknown = set(closing["joints"]) - set(joint_names)
+    if unknown:
+        raise HandError(f"closing.joints names unknown joints: {', '.join(sorted(unknown))}")
+    palm = description["palm"]
+    return Hand(
+        name=description["name"],
+        mjcf=folder / description["model"],
+        joint_names=joint_names,
+        T_root_palm=make_transform(
+            matrix_from_euler_xyz(np.array(palm["rpy"], dtype=float)), np.array(palm["position"], dtype=float)
+        ),
+        eigengrasp_origin=np.array(description["eigengrasps"]["origin"], dtype=float),
+        eigengrasps=np.array(description["eigengrasps"]["directions"], dtype=float),
+        closing=ClosingMotion(
+            moves=np.array([float(name in closing["joints"]) for name in joint_names]),
+            speed=float(closing["speed"]),
+            lead=float(closing["lead"]),
+            duration=float(closing["duration"]),
+            squeeze=float(closing["squeeze"]),
+        ),
+    )
+
+
+def _check(hand: Hand) -> None:
+    """Raises HandError where the TOML and the MJCF do not fit each other."""
+    joints = hand.tree.joints
+    coupled = {coupling.follower for coupling in hand.tree.couplings}
+    wanted = set(joints) - coupled
+    if set(hand.joint_names) != wanted or len(hand.joint_names) != len(wanted):
+        missing, extra = wanted - set(hand.joint_names), set(hand.joint_names) - wanted
+        raise HandError(
+            f"joint_order of hand '{hand.name}' must name each uncoupled joint of {hand.mjcf.name} once: "
+            f"missing {sorted(missing)}, unknown or coupled {sorted(extra)}"
+        )
+    for name, array in (("origin", hand.eigengrasp_origin), ("directions", hand.eigengrasps)):
+        if array.shape[-1] != hand.num_joints:
+            raise HandError(f"eigengrasps.{name} must give {hand.num_joints} angles, got {array.shape[-1]}")
