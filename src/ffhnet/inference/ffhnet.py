@@ -1,0 +1,140 @@
+"""`FFHNet`: from an observation to ranked grasps."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from ffhnet.errors import HandError, OptionError, WeightsError
+from ffhnet.geometry.transforms import invert
+from ffhnet.grasps import Grasps
+from ffhnet.model.checkpoint import Checkpoint, CheckpointInfo, load_checkpoint
+from ffhnet.model.tensors import GraspTensors, ObjectTensors
+
+if TYPE_CHECKING:
+    from ffhnet.perception.observation import Observation
+
+VIEW_FRAME = "view"
+
+
+class FFHNet:
+    """FFHGenerator and FFHEvaluator of one hand (figure 1)."""
+
+    def __init__(self, checkpoint: Checkpoint, device: torch.device | str = "cpu"):
+        self.info: CheckpointInfo = checkpoint.info
+        self.device = torch.device(device)
+        self.generator = checkpoint.generator.to(self.device)
+        self.evaluator = checkpoint.evaluator.to(self.device)
+        self._joint_lower = np.array(self.info.joint_lower)
+        self._joint_upper = np.array(self.info.joint_upper)
+
+    @classmethod
+    def from_pretrained(
+        cls,
+        path_or_name: str | Path | None = None,
+        hand: str | None = None,
+        device: torch.device | str | None = None,
+    ) -> FFHNet:
+        """Load a checkpoint folder.
+
+        Args:
+            path_or_name: a folder, the name of weights that ship with the package, or None for the
+                package's own weights.
+            hand: name of the hand that the weights must be for; None takes any.
+            device: None takes CUDA where there is one, else the CPU.
+
+        Raises:
+            WeightsError: missing or damaged weights, or those of another hand.
+        """
+        if device is None:
+            device = "cuda" if torch.cuda.is_available() else "cpu"
+        return cls(load_checkpoint(_find_weights(path_or_name), hand=hand), device)
+
+    def grasp(
+        self, observation: Observation, num: int = 400, seed: int = 0, threshold: float = 0.0
+    ) -> Grasps:
+        """Sample grasps, rate them, and rank them.
+
+        Args:
+            observation: what the camera sees of the object.
+            num: grasps to sample.
+            seed: of the latent samples; the same seed gives the same grasps.
+            threshold: grasps below this success probability are left out, possibly all.
+
+        Returns:
+            Grasps in the observation's input frame, most probable first.
+        """
+        if not 0 <= threshold <= 1:
+            raise OptionError(f"the threshold is a probability between 0 and 1, got {threshold}")
+        in_view = self.generate(observation, num, torch.Generator().manual_seed(seed))
+        probability = self._rate(observation, in_view)
+        kept = probability >= threshold
+        ranked = in_view[kept].replace(probability=probability[kept]).ranked()
+        return ranked.to_frame(observation.T_input_view, observation.frame)
+
+    def generate(self, observation: Observation, num: int, generator: torch.Generator) -> Grasps:
+        """Raw samples of the FFHGenerator in the view frame, neither rated nor ranked.
+
+        Args:
+            observation: what the camera sees of the object.
+            num: grasps to sample.
+            generator: source of the latent samples z ~ N(0, I), on the CPU.
+        """
+        if num < 1:
+            raise OptionError(f"the number of grasps must be at least 1, got {num}")
+        latent = torch.randn(1, num, self.info.model.latent, generator=generator).to(self.device)
+        with torch.inference_mode():
+            raw = self.generator.decode(self._objects(observation), latent)
+        return Grasps(
+            rotation=raw.rotation[0].double().cpu().numpy(),
+            position=raw.position[0].double().cpu().numpy(),
+            joints=np.clip(raw.joints[0].double().cpu().numpy(), self._joint_lower, self._joint_upper),
+            joint_names=self.info.joint_names,
+            hand=self.info.hand,
+            frame=VIEW_FRAME,
+        )
+
+    def evaluate(self, observation: Observation, grasps: Grasps) -> Float[np.ndarray, " N"]:
+        """Success probability of grasps given in the observation's input frame.
+
+        Raises:
+            HandError: grasps of another hand or with other joints.
+            OptionError: grasps in another frame.
+        """
+        if (grasps.hand, grasps.joint_names) != (self.info.hand, self.info.joint_names):
+            raise HandError(f"these networks rate grasps of {self.info.hand}, got {grasps.hand}'s joints")
+        if grasps.frame != observation.frame:
+            raise OptionError(f"wanted grasps in frame {observation.frame!r}, got {grasps.frame!r}")
+        return self._rate(observation, grasps.to_frame(invert(observation.T_input_view), VIEW_FRAME))
+
+    def _rate(self, observation: Observation, in_view: Grasps) -> Float[np.ndarray, " N"]:
+        def tensor(array: np.ndarray) -> torch.Tensor:
+            return torch.as_tensor(array, dtype=torch.float32, device=self.device).unsqueeze(0)
+
+        grasps = GraspTensors(tensor(in_view.rotation), tensor(in_view.position), tensor(in_view.joints))
+        with torch.inference_mode():
+            logits = self.evaluator(self._objects(observation), grasps)
+        return torch.sigmoid(logits[0].double()).cpu().numpy()
+
+    def _objects(self, observation: Observation) -> ObjectTensors:
+        wanted = self.info.model.bps_size
+        if np.shape(observation.bps) != (wanted,):
+            raise OptionError(f"these networks take {wanted} BPS values, got {np.shape(observation.bps)}")
+        bps = torch.as_tensor(observation.bps, dtype=torch.float32, device=self.device)
+        height = torch.tensor([observation.table_height], dtype=torch.float32, device=self.device)
+        return ObjectTensors(bps.unsqueeze(0), height)
+
+
+def _find_weights(path_or_name: str | Path | None) -> Path:
+    shipped = Path(str(resources.files("ffhnet"))) / "weights"
+    if path_or_name is None:
+        return shipped
+    for folder in (Path(path_or_name), shipped / path_or_name):
+        if folder.is_dir():
+            return folder
+    raise WeightsError(f"no folder and no shipped weights of the name {str(path_or_name)!r}")

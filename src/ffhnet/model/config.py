@@ -1,0 +1,84 @@
+"""Sizes and switches of the two networks, with the paper's preset and the project's own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ffhnet.errors import OptionError
+
+
+@dataclass(frozen=True)
+class ModelConfig:
+    """Architecture shared by FFHGenerator and FFHEvaluator.
+
+    Attributes:
+        num_joints: actuated joints of the hand.
+        bps_size: length of the basis point set vector.
+        pca_components: width of the fixed projection of the BPS, or None to feed the raw vector.
+        use_table_height: give the height of the table (view frame) to the networks.
+        input_batch_norm: normalise raw inputs by batch norm (paper) instead of by fixed scales.
+        skip_batch_norm: batch norm also on the skip path of a ResBlock (paper yes, public code no).
+        use_joints: the evaluator sees the joint angles (paper yes, public code no).
+        position_scale: metres that count as 1 at the networks' inputs and outputs.
+        joint_scale: radians that count as 1.
+        height_scale: metres of table height that count as 1.
+        latent: size of the cVAE's latent vector.
+        inner_width: width between the two layers of a ResBlock.
+        width: output width of a ResBlock.
+        dropout: dropout after each ResBlock of the evaluator.
+    """
+
+    num_joints: int = 15
+    bps_size: int = 4096
+    pca_components: int | None = 96
+    use_table_height: bool = True
+    input_batch_norm: bool = False
+    skip_batch_norm: bool = True
+    use_joints: bool = True
+    position_scale: float = 0.1
+    joint_scale: float = 0.5
+    height_scale: float = 0.1
+    latent: int = 5
+    inner_width: int = 256
+    width: int = 512
+    dropout: float = 0.3
+
+    def __post_init__(self) -> None:
+        sizes = (self.num_joints, self.bps_size, self.latent, self.inner_width, self.width)
+        if min(sizes) < 1:
+            raise OptionError(f"all sizes of ModelConfig must be at least 1, got {sizes}")
+        if self.pca_components is not None and not 1 <= self.pca_components <= self.bps_size:
+            raise OptionError(
+                f"pca_components must lie between 1 and bps_size {self.bps_size}, got {self.pca_components}"
+            )
+
+    @classmethod
+    def default(cls, num_joints: int = 15) -> ModelConfig:
+        """The project's own preset: BPS through a fixed PCA projection, table height, fixed input scales.
+
+        Neighbouring BPS entries are nearly collinear, which makes the raw 4096 inputs slow to learn from.
+        """
+        return cls(num_joints=num_joints)
+
+    @classmethod
+    def paper(cls, num_joints: int = 15) -> ModelConfig:
+        """Section III with the sizes of the public code: raw BPS, input batch norm, no table height."""
+        return cls(
+            num_joints=num_joints,
+            pca_components=None,
+            use_table_height=False,
+            input_batch_norm=True,
+            skip_batch_norm=False,
+            position_scale=1.0,
+            joint_scale=1.0,
+        )
+
+    @property
+    def condition_width(self) -> int:
+        """Width of what the networks see of the object."""
+        bps = self.bps_size if self.pca_components is None else self.pca_components
+        return bps + int(self.use_table_height)
+
+    def grasp_width(self, with_joints: bool) -> int:
+        """Width of what the networks see of a grasp: rotation 9, position 3, joints."""
+        return 12 + (self.num_joints if with_joints else 0)

@@ -1,0 +1,131 @@
+"""What differs between training the generator and the evaluator: batches, loss and held-out metrics."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from ffhnet.dataset.training_data import TrainingData
+from ffhnet.evaluation.metrics import auroc, binary_cross_entropy, expected_calibration_error
+from ffhnet.geometry.rotations import geodesic_angle
+from ffhnet.model.evaluator import FFHEvaluator
+from ffhnet.model.generator import FFHGenerator
+from ffhnet.model.losses import evaluator_loss, generator_loss, kl_divergence
+from ffhnet.training.batches import Batch, BatchMaker
+from ffhnet.training.config import TrainingConfig
+
+HELD_OUT_VIEWS, HELD_OUT_GRASPS, HELD_OUT_SEED = 128, 64, 20
+"""Size and seed of the fixed batch on which metrics are measured."""
+
+
+class Task(Protocol):
+    """A network together with what it is to learn."""
+
+    @property
+    def module(self) -> nn.Module:
+        """The network in training."""
+        ...
+
+    def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
+        """Loss of a fresh batch and its parts for the log; noise comes from torch's global generator."""
+        ...
+
+    def metrics(self) -> dict[str, float]:
+        """Metrics on held-out data, empty without any."""
+        ...
+
+
+class GeneratorTask:
+    """Reconstruct successful grasps through a Gaussian latent (Eq. 3 and 4)."""
+
+    def __init__(
+        self, module: FFHGenerator, config: TrainingConfig, data: TrainingData, held_out: TrainingData | None
+    ):
+        self.module = module
+        self.config = config
+        self._device = next(module.parameters()).device
+        self._batches = BatchMaker.for_generator(data)
+        self._held_out = None
+        if held_out is not None:
+            self._held_out = _held_out_batch(BatchMaker.for_generator(held_out), self._device)
+
+    def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
+        """Eq. 3 on one batch."""
+        batch = self._batches.draw(rng, self.config.views, self.config.grasps).to(self._device)
+        noise = torch.randn(*batch.label.shape, self.config.model.latent, device=self._device)
+        predicted, latent = self.module(batch.objects, batch.grasps, noise)
+        parts = generator_loss(predicted, batch.grasps, latent)
+        total = parts.total(self.config.kl_weight_at(step))
+        names = ("rotation", "position", "joints", "kl")
+        return total, {"loss": total.item(), **{name: getattr(parts, name).item() for name in names}}
+
+    def metrics(self) -> dict[str, float]:
+        """Reconstruction errors and KL on held-out successes."""
+        return {} if self._held_out is None else generator_metrics(self.module, self._held_out)
+
+
+class EvaluatorTask:
+    """Predict the success of grasps of all kinds (Eq. 5)."""
+
+    def __init__(
+        self, module: FFHEvaluator, config: TrainingConfig, data: TrainingData, held_out: TrainingData | None
+    ):
+        self.module = module
+        self.config = config
+        self._device = next(module.parameters()).device
+        self._batches = BatchMaker.for_evaluator(data, config.shares)
+        self._held_out = None
+        if held_out is not None:
+            self._held_out = _held_out_batch(BatchMaker.for_evaluator(held_out, None), self._device)
+
+    def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
+        """Eq. 5 on one batch."""
+        batch = self._batches.draw(rng, self.config.views, self.config.grasps).to(self._device)
+        total = evaluator_loss(self.module(batch.objects, batch.grasps), batch.label)
+        return total, {"loss": total.item()}
+
+    def metrics(self) -> dict[str, float]:
+        """Discrimination and calibration on held-out trials, drawn as often as they occur."""
+        return {} if self._held_out is None else evaluator_metrics(self.module, self._held_out)
+
+
+def generator_metrics(module: FFHGenerator, batch: Batch) -> dict[str, float]:
+    """Mean errors of the reconstruction through the latent mean, and the KL divergence."""
+    module.eval()
+    with torch.inference_mode():
+        latent = module.encode(batch.objects, batch.grasps)
+        predicted = module.decode(batch.objects, latent.mean)
+        kl = kl_divergence(latent).item()
+    module.train()
+    distance = (predicted.position - batch.grasps.position).norm(dim=-1)
+    angle = geodesic_angle(
+        predicted.rotation.double().cpu().numpy(), batch.grasps.rotation.double().cpu().numpy()
+    )
+    return {
+        "position_mm": 1000 * distance.mean().item(),
+        "rotation_deg": float(np.rad2deg(angle).mean()),
+        "joints_rad": (predicted.joints - batch.grasps.joints).abs().mean().item(),
+        "kl_nats": kl,
+    }
+
+
+def evaluator_metrics(module: FFHEvaluator, batch: Batch) -> dict[str, float]:
+    """AUROC, cross-entropy and expected calibration error of the predicted probabilities."""
+    module.eval()
+    with torch.inference_mode():
+        probability = torch.sigmoid(module(batch.objects, batch.grasps)).flatten().cpu().numpy()
+    module.train()
+    label = batch.label.flatten().cpu().numpy()
+    return {
+        "auroc": auroc(label, probability),
+        "bce": binary_cross_entropy(label, probability),
+        "ece": expected_calibration_error(label, probability),
+    }
+
+
+def _held_out_batch(batches: BatchMaker, device: torch.device) -> Batch:
+    rng = np.random.default_rng(HELD_OUT_SEED)
+    return batches.draw(rng, HELD_OUT_VIEWS, HELD_OUT_GRASPS).to(device)
