@@ -1,0 +1,106 @@
+"""Point clouds: from a depth image, their normals, and whether a user's cloud can be used."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.spatial import cKDTree
+
+from ffhnet.errors import CloudError
+from ffhnet.perception.camera import Intrinsics
+
+MIN_POINTS = 50
+"""Fewer points do not show a shape."""
+
+MAX_EXTENT = 10.0
+"""m: no view of a table is wider, but one in millimetres is."""
+
+
+def depth_to_cloud(
+    depth: Float[np.ndarray, "H W"], intrinsics: Intrinsics
+) -> tuple[Float[np.ndarray, "N 3"], Int[np.ndarray, " N"]]:
+    """The points of a depth image in the camera frame (m), row by row.
+
+    Args:
+        depth: metres along the optical axis; zero, negative or not finite = no reading.
+        intrinsics: the camera, of the image's size.
+
+    Returns:
+        The points, and the index of each one's pixel in `depth.ravel()`.
+
+    Raises:
+        CloudError: the image is not of the size that the intrinsics belong to.
+    """
+    wanted = (intrinsics.height, intrinsics.width)
+    if np.shape(depth) != wanted:
+        raise CloudError(f"the intrinsics want a depth image of {wanted} pixels, got {np.shape(depth)}")
+    flat = np.asarray(depth, dtype=float).ravel()
+    pixels = np.flatnonzero((flat > 0) & np.isfinite(flat))
+    z = flat[pixels]
+    v, u = np.divmod(pixels, intrinsics.width)
+    x, y = intrinsics.rays()
+    return np.column_stack([x[u] * z, y[v] * z, z]), pixels
+
+
+def search_tree(points: Float[np.ndarray, "N 3"]) -> cKDTree:
+    """A k-d tree for points on a surface.
+
+    Sliding-midpoint splits with loose boxes answer queries up to ten times faster than SciPy's default
+    here, and build faster; the answers are the same.
+    """
+    return cKDTree(points, leafsize=32, balanced_tree=False, compact_nodes=False)
+
+
+def estimate_normals(
+    cloud: Float[np.ndarray, "N 3"], viewpoint: Float[np.ndarray, " 3"], k: int = 20
+) -> Float[np.ndarray, "N 3"]:
+    """Unit normals, each the direction of least spread of the k nearest points, turned to `viewpoint`.
+
+    Raises:
+        CloudError: there are fewer than three points.
+    """
+    cloud = np.asarray(cloud, dtype=float)
+    if len(cloud) < 3:
+        raise CloudError(f"normals want at least 3 points, got {len(cloud)}")
+    _, neighbours = search_tree(cloud).query(cloud, k=min(k, len(cloud)))
+    patches = cloud[neighbours]
+    patches -= patches.mean(axis=1, keepdims=True)
+    _, axes = np.linalg.eigh(np.swapaxes(patches, 1, 2) @ patches)
+    normals = axes[:, :, 0]
+    away = np.einsum("ij,ij->i", normals, np.asarray(viewpoint) - cloud) < 0
+    return np.where(away[:, None], -normals, normals)
+
+
+def validate_cloud(points: np.ndarray) -> Float[np.ndarray, "N 3"]:
+    """The usable points of a user's cloud, as float64 metres.
+
+    Rows that are not finite are dropped: organised clouds mark pixels without a reading so. Columns
+    after the third (colour, normals) are ignored, and an H×W×C image of points is flattened.
+
+    Raises:
+        CloudError: not numbers, not of shape N×3, empty, too few points left, all points the same, or
+            too large for metres.
+    """
+    points = np.asarray(points)
+    if not (np.issubdtype(points.dtype, np.floating) or np.issubdtype(points.dtype, np.integer)):
+        raise CloudError(f"a cloud must hold numbers, got {points.dtype}")
+    if points.ndim not in (2, 3) or points.shape[-1] < 3:
+        raise CloudError(f"a cloud must have shape (N, 3), got {points.shape}")
+    points = points.reshape(-1, points.shape[-1])[:, :3].astype(float)
+    if len(points) == 0:
+        raise CloudError("the cloud is empty: 0 points")
+    finite = points[np.isfinite(points).all(axis=1)]
+    if len(finite) == 0:
+        raise CloudError(f"the cloud has no finite point: all {len(points)} rows hold NaN or infinity")
+    if len(finite) < MIN_POINTS:
+        dropped = len(points) - len(finite)
+        raise CloudError(
+            f"a cloud must have at least {MIN_POINTS} points, got {len(finite)} ({dropped} not finite)"
+        )
+    if np.ptp(finite, axis=0).max() < 1e-6:
+        raise CloudError(f"all {len(finite)} points of the cloud are the same point")
+    # Percentiles, because cameras put a few readings at their largest number.
+    extent = np.ptp(np.percentile(finite, [2, 98], axis=0), axis=0).max()
+    if extent > MAX_EXTENT:
+        raise CloudError(f"the cloud is {extent:.0f} m wide: looks like millimetres, wanted metres")
+    return finite

@@ -1,0 +1,173 @@
+"""`Observation`: one object as the networks see it, from a cloud, a scene or a depth image."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ffhnet.errors import CloudError, OptionError, SceneError
+from ffhnet.geometry.transforms import apply, invert
+from ffhnet.perception.bps import encode
+from ffhnet.perception.camera import Intrinsics
+from ffhnet.perception.cloud import MIN_POINTS, depth_to_cloud, validate_cloud
+from ffhnet.perception.segment import MIN_HEIGHT, segment_objects
+from ffhnet.perception.table import Plane, fit_table
+from ffhnet.perception.view_frame import unit, view_frame
+
+_CENTRED = 0.05
+"""m: a cloud whose mean is nearer to the origin was centred; no camera sees an object so near."""
+
+_LOWEST_PERCENT = 0.5
+"""Percentile of the heights that is taken for the table where no plane is known: stray points lie lower."""
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One object from one view.
+
+    Attributes:
+        cloud: visible points of the object (m) in the input frame.
+        frame: name of the input frame, "camera" or "world".
+        T_input_view: pose of the view frame in the input frame.
+        table_height: z of the table in the view frame in metres, a negative number.
+        bps: basis point set encoding of the cloud in the view frame.
+        plane: the table in the input frame, or None where it was not seen.
+    """
+
+    cloud: Float[np.ndarray, "N 3"]
+    frame: str
+    T_input_view: Float[np.ndarray, "4 4"]
+    table_height: float
+    bps: Float[np.ndarray, " 4096"]
+    plane: Plane | None = None
+
+    @property
+    def up(self) -> Float[np.ndarray, " 3"]:
+        """Direction against gravity in the input frame."""
+        return self.T_input_view[:3, 2]
+
+    @property
+    def cloud_view(self) -> Float[np.ndarray, "N 3"]:
+        """The cloud (m) in the view frame."""
+        return apply(invert(self.T_input_view), self.cloud)
+
+
+def observe_object(
+    cloud: Float[np.ndarray, "N 3"],
+    up: Float[np.ndarray, " 3"],
+    frame: str,
+    viewing_direction: Float[np.ndarray, " 3"] | None = None,
+    table_height: float | None = None,
+) -> Observation:
+    """An object that was already cut out of its scene.
+
+    Args:
+        cloud: the object's visible points (m).
+        up: direction against gravity in the cloud's frame.
+        frame: name of that frame, "camera" or "world".
+        viewing_direction: from the camera to the object. If none: in the camera frame the direction to
+            the cloud's mean, or the optical axis if the cloud was centred; in any other frame,
+            where the camera is not known, +x.
+        table_height: z of the table in the view frame, that is relative to the cloud's mean (m,
+            negative). If none: the cloud's lowest point.
+
+    Raises:
+        CloudError: the cloud cannot be used (`validate_cloud`).
+        OptionError: a direction is not usable, or the table is above the cloud's mean.
+    """
+    cloud = validate_cloud(cloud)
+    up = unit(up, "up direction")
+    if viewing_direction is None:
+        viewing_direction = _guess_viewing_direction(cloud, frame)
+    T_input_view = view_frame(cloud, up, viewing_direction)
+    if table_height is None:
+        table_height = float(np.percentile((cloud - cloud.mean(axis=0)) @ up, _LOWEST_PERCENT))
+    if not table_height < 0:
+        raise OptionError(f"the table must be below the cloud's mean (negative metres), got {table_height}")
+    return _observation(cloud, frame, T_input_view, table_height, None)
+
+
+def observe_scene(
+    cloud_camera: Float[np.ndarray, "N 3"],
+    rng: np.random.Generator,
+    object_index: int = 0,
+    mask: Bool[np.ndarray, " N"] | None = None,
+) -> Observation:
+    """An object in a scene with a table, in the camera frame (section III).
+
+    Args:
+        cloud_camera: the whole scene (m), camera at the origin, optical axes.
+        rng: source of randomness for RANSAC.
+        object_index: which of the objects found, 0 = the main one.
+        mask: which points are the object, if that is known; `object_index` is then not used.
+
+    Raises:
+        CloudError: the cloud cannot be used.
+        SceneError: no table, no object, or not as many objects.
+        OptionError: the mask does not fit the cloud.
+    """
+    cloud_camera = np.asarray(cloud_camera)
+    if mask is not None:
+        mask = np.asarray(mask, dtype=bool).ravel()
+        if cloud_camera.ndim < 2 or len(mask) != cloud_camera.size // cloud_camera.shape[-1]:
+            raise OptionError(
+                f"the mask must have one value per point, got {mask.shape} for {cloud_camera.shape}"
+            )
+    cloud = validate_cloud(cloud_camera)
+    plane = fit_table(cloud, rng)
+    if mask is None:
+        objects = segment_objects(cloud, plane)
+        if not 0 <= object_index < len(objects):
+            raise SceneError(
+                f"wanted object {object_index}, but the scene has {len(objects)} (counted from 0)"
+            )
+        members = cloud[objects[object_index]]
+    else:
+        rows = cloud_camera.reshape(len(mask), -1)[:, :3]
+        members = rows[mask & np.isfinite(rows).all(axis=1)].astype(float)
+        members = members[plane.height(members) > MIN_HEIGHT]
+        if len(members) < MIN_POINTS:
+            raise SceneError(f"wanted {MIN_POINTS} points of the mask above the table, got {len(members)}")
+    T_input_view = view_frame(members, plane.normal, members.mean(axis=0))
+    table_height = -float(plane.height(T_input_view[:3, 3]))
+    return _observation(members, "camera", T_input_view, table_height, plane)
+
+
+def observe_depth(
+    depth: Float[np.ndarray, "H W"],
+    intrinsics: Intrinsics,
+    rng: np.random.Generator,
+    mask: Bool[np.ndarray, "H W"] | None = None,
+    object_index: int = 0,
+) -> Observation:
+    """`observe_scene` of a depth image in metres (0 = no reading), with a mask in pixels."""
+    cloud, pixels = depth_to_cloud(depth, intrinsics)
+    if mask is not None and np.shape(mask) != np.shape(depth):
+        raise OptionError(
+            f"the mask must be of the depth image's size {np.shape(depth)}, got {np.shape(mask)}"
+        )
+    chosen = None if mask is None else np.asarray(mask, dtype=bool).ravel()[pixels]
+    if len(cloud) == 0:
+        raise CloudError("the depth image has no reading: all pixels are 0")
+    return observe_scene(cloud, rng, object_index, chosen)
+
+
+def _observation(
+    cloud: Float[np.ndarray, "N 3"],
+    frame: str,
+    T_input_view: Float[np.ndarray, "4 4"],
+    table_height: float,
+    plane: Plane | None,
+) -> Observation:
+    bps = encode(apply(invert(T_input_view), cloud))
+    return Observation(cloud, frame, T_input_view, table_height, bps, plane)
+
+
+def _guess_viewing_direction(cloud: Float[np.ndarray, "N 3"], frame: str) -> Float[np.ndarray, " 3"]:
+    """Where the camera probably looked: exact for clouds in the camera frame, else along +x."""
+    if frame != "camera":
+        return np.array([1.0, 0.0, 0.0])
+    middle = cloud.mean(axis=0)
+    return middle if np.linalg.norm(middle) > _CENTRED else np.array([0.0, 0.0, 1.0])

@@ -1,0 +1,136 @@
+"""Objects on a table: what stands out of the plane, taken apart into clusters."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy import ndimage, sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull, QhullError, cKDTree
+
+from ffhnet.errors import SceneError
+from ffhnet.perception.cloud import MIN_POINTS, search_tree
+from ffhnet.perception.table import Plane
+
+MIN_HEIGHT = 0.005
+"""m above the table: lower points are taken for table, being within the noise of real cameras."""
+
+_SEED_HEIGHT = 0.01
+"""m: clusters are made of points above this, so that bumps of the table do not bridge two objects; their
+lower points come after."""
+
+_MAX_SIZE = 0.6
+"""m: nothing higher or wider is an object for a hand; walls and arms are."""
+
+_VOXEL = 0.005
+_LINK = 0.015
+"""m: voxels nearer than this belong to one object. Wider than the gaps that noise and grazing views leave."""
+
+_CELL = 0.02
+"""m: cells of the map of the table."""
+
+_MIN_DENSITY = 0.1
+"""Share of a cluster's median point density below which points are stray (flying pixels)."""
+
+_CENTRE_WIDTH = 0.4
+"""rad off the optical axis at which an object counts e times less than in the middle."""
+
+
+def segment_objects(
+    cloud: Float[np.ndarray, "N 3"], plane: Plane, min_height: float = MIN_HEIGHT
+) -> list[Int[np.ndarray, " M"]]:
+    """Indices of the points of each object that stands on the table, the main object first.
+
+    Main is what has many points and is near the optical axis. Things beside the table (walls, the
+    floor's furniture) and things larger than 0.6 m are left out.
+
+    Args:
+        cloud: the scene (m) in the camera frame.
+        plane: the table in the same frame.
+        min_height: metres above the table at which an object begins.
+
+    Raises:
+        SceneError: nothing stands on the table.
+    """
+    height = plane.height(cloud)
+    on_plane = cloud[np.abs(height) < min_height]
+    standing = np.flatnonzero((height > min_height) & (height < _MAX_SIZE))
+    if len(on_plane) and len(standing):
+        standing = standing[_inside(plane.coordinates(cloud[standing]), plane.coordinates(on_plane))]
+    seeds = standing[height[standing] > max(_SEED_HEIGHT, min_height)]
+    if len(seeds) < MIN_POINTS:
+        raise SceneError(
+            f"no object on the table: wanted {MIN_POINTS} points above {1000 * _SEED_HEIGHT:.0f} mm, "
+            f"got {len(seeds)}"
+        )
+    labels = _clusters(cloud[seeds])
+    low = standing[height[standing] <= max(_SEED_HEIGHT, min_height)]
+    found = []
+    for members, foot in _with_low_points(cloud, seeds, labels, low):
+        size = np.ptp(cloud[members], axis=0).max()
+        if len(members) >= MIN_POINTS and size < _MAX_SIZE:
+            found.append(np.sort(np.concatenate([members, foot])))
+    if not found:
+        raise SceneError(f"no object on the table: no cluster of {MIN_POINTS} points below {_MAX_SIZE} m")
+    return sorted(found, key=lambda members: -_prominence(cloud[members]))
+
+
+def _prominence(points: Float[np.ndarray, "N 3"]) -> float:
+    """Number of points, less for objects off the optical axis."""
+    middle = points.mean(axis=0)
+    off_axis = np.arctan2(np.linalg.norm(middle[:2]), middle[2])
+    return len(points) * float(np.exp(-((off_axis / _CENTRE_WIDTH) ** 2)))
+
+
+def _inside(points: Float[np.ndarray, "N 2"], table: Float[np.ndarray, "M 2"]) -> Bool[np.ndarray, " N"]:
+    """Which points lie over the largest connected piece of table, holes and notches filled up."""
+    middle = np.median(table, axis=0)
+    cells = np.floor((table - middle) / _CELL).astype(int)
+    reach = int(1.5 / _CELL)
+    cells = cells[np.abs(cells).max(axis=1) < reach] + reach
+    seen = np.zeros((2 * reach, 2 * reach), dtype=bool)
+    seen[cells[:, 0], cells[:, 1]] = True
+    # One cell of closing joins table parts that a thin shadow separates.
+    pieces, count = ndimage.label(ndimage.binary_dilation(seen), structure=np.ones((3, 3)))
+    if count == 0:
+        return np.zeros(len(points), dtype=bool)
+    largest = 1 + int(np.argmax(np.bincount(pieces.ravel())[1:]))
+    corners = (np.argwhere(seen & (pieces == largest)) + 0.5 - reach) * _CELL + middle
+    try:
+        sides = ConvexHull(corners).equations
+    except QhullError:
+        return np.zeros(len(points), dtype=bool)
+    return (points @ sides[:, :2].T + sides[:, 2] < _CELL / 2).all(axis=1)
+
+
+def _clusters(points: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
+    """Label of each point's Euclidean cluster, -1 for stray points."""
+    cells, voxel_of, counts = np.unique(
+        np.floor(points / _VOXEL).astype(int), axis=0, return_inverse=True, return_counts=True
+    )
+    voxel_of = voxel_of.ravel()
+    n = len(cells)
+    pairs = cKDTree(cells * _VOXEL).query_pairs(_LINK, output_type="ndarray")
+    links = sparse.coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n)).tocsr()
+    _, component = connected_components(links, directed=False)
+    density = counts + links @ counts + links.T @ counts
+    usual = ndimage.median(density, component, np.arange(component.max() + 1))
+    component[density < _MIN_DENSITY * usual[component]] = -1
+    return component[voxel_of]
+
+
+def _with_low_points(
+    cloud: Float[np.ndarray, "N 3"],
+    seeds: Int[np.ndarray, " S"],
+    labels: Int[np.ndarray, " S"],
+    low: Int[np.ndarray, " L"],
+) -> list[tuple[Int[np.ndarray, " M"], Int[np.ndarray, " F"]]]:
+    """Each cluster's points, and the points below the seed height next to it."""
+    kept = labels >= 0
+    seeds, labels = seeds[kept], labels[kept]
+    owner = np.full(len(low), -1)
+    if len(low) and len(seeds):
+        distance, nearest = search_tree(cloud[seeds]).query(cloud[low], distance_upper_bound=_SEED_HEIGHT)
+        near = np.isfinite(distance)
+        owner[near] = labels[nearest[near]]
+    return [(seeds[labels == label], low[owner == label]) for label in np.unique(labels)]
