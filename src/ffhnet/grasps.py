@@ -19,8 +19,8 @@ class Grasps:
     Attributes:
         rotation: palm axes as columns, in `frame`.
         position: palm origin in `frame`, metres.
-        joints: joint angles in radians, in the order of `joint_names`. They are the pre-shape:
-            where the fingers stand when closing begins.
+        joints: joint angles in radians, in the order of `joint_names`: the shape to which the open hand
+            closes once the palm is in place. From there all fingers close on until contact stops them.
         joint_names: names of the actuated joints.
         hand: name of the hand.
         frame: name of the frame, for example "world", "camera" or "view".

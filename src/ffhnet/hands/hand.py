@@ -32,10 +32,10 @@ class ClosingMotion:
     """How the fingers close (section IV-B, "closing primitive").
 
     Attributes:
-        moves: for each joint, whether it closes or holds its pre-shape.
+        moves: for each joint, 1 if it closes, 0 if it holds the grasp's angle throughout.
         speed: rad/s of the closing joints' targets.
         lead: rad that a target may be ahead of its joint; with the torque limit it decides the squeeze.
-        duration: s of closing.
+        duration: s of closing, from the open hand.
         squeeze: s for which the last targets are kept before the lift.
     """
 

@@ -1,0 +1,1 @@
+"""MuJoCo scenes and the grasp trial that earns every label."""

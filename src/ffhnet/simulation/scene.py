@@ -1,0 +1,138 @@
+"""The MuJoCo scene of a grasp trial: a floating hand, one object, and a table that can drop away.
+
+The palm stands still and the table sinks by the lift height, which is the same motion seen from the hand
+and needs no moving base: a mocap body has no velocity, so a lifted mocap hand would leave the object behind.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+
+from ffhnet.geometry.rotations import quaternion_from_matrix
+from ffhnet.hands import Hand
+from ffhnet.objects.grasp_object import GraspObject
+from ffhnet.simulation.physics import Physics
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A compiled model with the indices that a trial needs.
+
+    Attributes:
+        model, data: MuJoCo's; `data` is scratch space that every trial resets.
+        joint_qpos: qpos index of each actuated joint, in the hand's order.
+        follower_qpos, leader_joint: qpos index of each coupled joint and the column of its leader.
+        actuators: ctrl index of each actuated joint, in the hand's order.
+        object_qpos: qpos index of the object's free joint.
+        geom_owner: for each geom TABLE, OBJECT or HAND.
+        hand_mocap, table_mocap: mocap indices.
+        object_body: body id of the object.
+    """
+
+    hand: Hand
+    obj: GraspObject
+    physics: Physics
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    joint_qpos: Int[np.ndarray, " J"]
+    follower_qpos: Int[np.ndarray, " C"]
+    leader_joint: Int[np.ndarray, " C"]
+    actuators: Int[np.ndarray, " J"]
+    object_qpos: int
+    geom_owner: Int[np.ndarray, " G"]
+    hand_mocap: int
+    table_mocap: int
+    object_body: int
+
+    def place_hand(self, T_world_root: Float[np.ndarray, "4 4"], joints: Float[np.ndarray, " J"]) -> None:
+        """Sets the hand's root pose and joint angles (rad), coupled joints included."""
+        self.data.mocap_pos[self.hand_mocap] = T_world_root[:3, 3]
+        self.data.mocap_quat[self.hand_mocap] = quaternion_from_matrix(T_world_root[:3, :3])
+        self.data.qpos[self.joint_qpos] = joints
+        self.data.qpos[self.follower_qpos] = joints[self.leader_joint]
+
+    def place_object(self, T_world_object: Float[np.ndarray, "4 4"]) -> None:
+        """Sets the object's pose."""
+        q = self.object_qpos
+        self.data.qpos[q : q + 3] = T_world_object[:3, 3]
+        self.data.qpos[q + 3 : q + 7] = quaternion_from_matrix(T_world_object[:3, :3])
+
+
+TABLE, OBJECT, HAND = 0, 1, 2
+PREFIX = "hand/"
+"""Before the names of the hand's joints and bodies in a scene."""
+
+
+def build_scene(hand: Hand, obj: GraspObject, physics: Physics | None = None) -> Scene:
+    """Compiles the scene of one hand and one object."""
+    physics = physics or Physics()
+    spec = mujoco.MjSpec()
+    _set_options(spec, physics)
+
+    table = spec.worldbody.add_body(name="table", mocap=True)
+    table.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.0, 1.0, 0.1])
+
+    body = spec.worldbody.add_body(name="object")
+    body.add_freejoint()
+    density = obj.mass / sum(piece.volume for piece in obj.pieces)
+    for i, piece in enumerate(obj.pieces):
+        mesh = spec.add_mesh(name=f"piece_{i}", uservert=np.asarray(piece.vertices, np.float32).ravel())
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+        # The world's bit 1 in both masks: every part of the hand names it as something to collide with.
+        body.add_geom(
+            name=f"piece_{i}", type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"piece_{i}", density=density
+        )
+
+    mount = spec.worldbody.add_body(name="hand", mocap=True)
+    hand_spec = mujoco.MjSpec.from_file(str(hand.mjcf))
+    mount.add_frame().attach_body(hand_spec.worldbody.first_body(), PREFIX, "")
+    for geom in spec.geoms:
+        geom.friction = physics.friction
+        geom.solref = [physics.contact_time_constant, 1.0]
+        geom.condim = 4
+    for equality in spec.equalities:
+        equality.solref = [physics.contact_time_constant, 1.0]
+        equality.solimp[:3] = [0.95, 0.99, 0.001]
+    model = spec.compile()
+    return _index(hand, obj, physics, model)
+
+
+def _set_options(spec: mujoco.MjSpec, physics: Physics) -> None:
+    option = spec.option
+    option.timestep = physics.timestep
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.impratio = physics.impratio
+    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    option.iterations = 50
+    option.ls_iterations = 50
+    option.tolerance = 1e-8
+    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+
+
+def _index(hand: Hand, obj: GraspObject, physics: Physics, model: mujoco.MjModel) -> Scene:
+    hand_body = model.body("hand").id
+    object_body = model.body("object").id
+    root = model.body_rootid[model.geom_bodyid]
+    owner = np.where(root == hand_body, HAND, np.where(root == object_body, OBJECT, TABLE))
+    couplings = hand.tree.couplings
+    return Scene(
+        hand=hand,
+        obj=obj,
+        physics=physics,
+        model=model,
+        data=mujoco.MjData(model),
+        joint_qpos=np.array([model.joint(PREFIX + name).qposadr[0] for name in hand.joint_names]),
+        follower_qpos=np.array([model.joint(PREFIX + c.follower).qposadr[0] for c in couplings], dtype=int),
+        leader_joint=np.array([hand.joint_names.index(c.leader) for c in couplings], dtype=int),
+        actuators=np.array([model.actuator(PREFIX + name).id for name in hand.joint_names]),
+        object_qpos=int(model.jnt_qposadr[model.body_jntadr[object_body]]),
+        geom_owner=owner,
+        hand_mocap=int(model.body_mocapid[hand_body]),
+        table_mocap=int(model.body_mocapid[model.body("table").id]),
+        object_body=object_body,
+    )

@@ -1,0 +1,223 @@
+"""The grasp trial: reach, close, lift, hold (section IV-B, "closing primitive" and lifting attempt)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from enum import IntEnum
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ffhnet.geometry.transforms import make_transform
+from ffhnet.grasps import Grasps
+from ffhnet.simulation.scene import HAND, OBJECT, TABLE, Scene
+
+
+class Outcome(IntEnum):
+    """What became of a trial. All but SUCCESS are failures."""
+
+    SUCCESS = 0
+    COLLISION = 1  # the hand touches object or table before closing, or on its way there
+    MISSED = 2  # no contact with the object after closing
+    SLIPPED = 3  # left behind, lost or still on the table during the lift
+    DROPPED = 4  # lost, or moving in the hand, during the hold
+    UNSTABLE = 5  # the simulation broke down; counted as a failure and kept visible
+
+
+@dataclass(frozen=True)
+class TrialResults:
+    """One row per trial.
+
+    Attributes:
+        outcome: an `Outcome`.
+        closed_joints: measured joint angles after closing and squeezing, rad (the grasp's if not closed).
+        contact_links: number of hand links that touch the object after closing.
+        pushed: m that the object moved on the table while the fingers closed.
+        rise: m that the object rose against the table by the end (0 if not lifted).
+        hold_slip: m that the object moved in the hand during the hold (0 if not held).
+    """
+
+    outcome: Int[np.ndarray, " N"]
+    closed_joints: Float[np.ndarray, "N J"]
+    contact_links: Int[np.ndarray, " N"]
+    pushed: Float[np.ndarray, " N"]
+    rise: Float[np.ndarray, " N"]
+    hold_slip: Float[np.ndarray, " N"]
+
+    @property
+    def success(self) -> Bool[np.ndarray, " N"]:
+        """Whether the object was lifted and held."""
+        return self.outcome == Outcome.SUCCESS
+
+    @property
+    def executed(self) -> Bool[np.ndarray, " N"]:
+        """Whether the hand could take up its pose, so that the grasp was tried at all."""
+        return self.outcome != Outcome.COLLISION
+
+    def __len__(self) -> int:
+        return len(self.outcome)
+
+    @staticmethod
+    def concatenate(parts: list[TrialResults]) -> TrialResults:
+        """One table from several."""
+        return TrialResults(
+            *(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(TrialResults))
+        )
+
+
+@dataclass
+class _Row:
+    outcome: Outcome
+    closed_joints: Float[np.ndarray, " J"]
+    contact_links: int = 0
+    pushed: float = 0.0
+    rise: float = 0.0
+    hold_slip: float = 0.0
+
+
+class GraspTrial:
+    """Executes grasps on one object; build once per object, run as many grasps as wanted."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._hand = scene.hand
+        self._physics = scene.physics
+        self._steps = round(scene.physics.control_period / scene.physics.timestep)
+
+    def run(self, grasps: Grasps, T_world_object: Float[np.ndarray, "4 4"]) -> TrialResults:
+        """Executes every grasp (world frame, table top z = 0) on the object at the given resting pose."""
+        rows = [self._run_one(grasps, i, T_world_object) for i in range(len(grasps))]
+        return TrialResults(
+            outcome=np.array([row.outcome for row in rows], dtype=np.int8),
+            closed_joints=np.array([row.closed_joints for row in rows]).reshape(-1, self._hand.num_joints),
+            contact_links=np.array([row.contact_links for row in rows], dtype=np.int8),
+            pushed=np.array([row.pushed for row in rows]),
+            rise=np.array([row.rise for row in rows]),
+            hold_slip=np.array([row.hold_slip for row in rows]),
+        )
+
+    def free(self, grasps: Grasps, T_world_object: Float[np.ndarray, "4 4"]) -> Bool[np.ndarray, " N"]:
+        """Whether the open hand can reach each palm pose on a straight approach along the palm's x axis."""
+        self._reset(T_world_object)
+        return np.array([self._can_reach(grasps, i) for i in range(len(grasps))], dtype=bool)
+
+    def _reset(self, T_world_object: Float[np.ndarray, "4 4"]) -> None:
+        mujoco.mj_resetData(self._scene.model, self._scene.data)
+        self._scene.place_object(T_world_object)
+
+    def _can_reach(self, grasps: Grasps, i: int) -> bool:
+        T_world_root = self._hand.root_pose(grasps.rotation[i], grasps.position[i])
+        approach_axis, opened = grasps.rotation[i][:, 0], self._hand.open(grasps.joints[i])
+        # The grasp pose first: it is where most collisions are found.
+        for back in np.linspace(0, self._physics.approach_distance, self._physics.approach_steps):
+            retreat = make_transform(position=-back * approach_axis)
+            if self._collides(retreat @ T_world_root, opened):
+                return False
+        return True
+
+    def _collides(self, T_world_root: Float[np.ndarray, "4 4"], joints: Float[np.ndarray, " J"]) -> bool:
+        scene = self._scene
+        scene.place_hand(T_world_root, joints)
+        mujoco.mj_kinematics(scene.model, scene.data)
+        mujoco.mj_collision(scene.model, scene.data)
+        owners = scene.geom_owner[scene.data.contact.geom]
+        return bool((owners == HAND).any())
+
+    def _run_one(self, grasps: Grasps, i: int, T_world_object: Float[np.ndarray, "4 4"]) -> _Row:
+        self._reset(T_world_object)
+        joints = grasps.joints[i]
+        if not self._can_reach(grasps, i):
+            return _Row(Outcome.COLLISION, joints)
+        self._reset(T_world_object)
+        self._scene.place_hand(
+            self._hand.root_pose(grasps.rotation[i], grasps.position[i]), self._hand.open(joints)
+        )
+        mujoco.mj_forward(self._scene.model, self._scene.data)
+        row = self._execute(joints)
+        if self._scene.data.warning.number[mujoco.mjtWarning.mjWARN_BADQACC] > 0:
+            row.outcome = Outcome.UNSTABLE
+        return row
+
+    def _execute(self, joints: Float[np.ndarray, " J"]) -> _Row:
+        data, physics = self._scene.data, self._physics
+        start = self._object_position()
+        self._close(joints)
+        links, _ = self._touching()
+        row = _Row(Outcome.MISSED, data.qpos[self._scene.joint_qpos].copy(), links)
+        row.pushed = float(np.linalg.norm(self._object_position() - start))
+        if links == 0:
+            return row
+
+        row.outcome = Outcome.SLIPPED
+        for sunk in _quintic(physics.lift_duration, physics.control_period) * physics.lift_height:
+            data.mocap_pos[self._scene.table_mocap, 2] = -sunk
+            self._advance()
+            row.rise = float(self._object_position()[2] - start[2] + sunk)
+            # An object that lags by 10 cm has been left on the table or is falling.
+            if sunk - row.rise > 0.10 or (sunk - row.rise > 0.01 and self._touching()[0] == 0):
+                return row
+        if row.rise < physics.min_rise:
+            return row
+
+        row.outcome = Outcome.DROPPED
+        held = self._object_position()
+        for _ in range(round(physics.hold_duration / physics.control_period)):
+            self._advance()
+        row.rise = float(self._object_position()[2] - start[2] + physics.lift_height)
+        row.hold_slip = float(np.linalg.norm(self._object_position() - held))
+        links, on_table = self._touching()
+        if (
+            links > 0
+            and not on_table
+            and row.rise >= physics.min_rise
+            and row.hold_slip <= physics.max_hold_slip
+        ):
+            row.outcome = Outcome.SUCCESS
+        return row
+
+    def _close(self, joints: Float[np.ndarray, " J"]) -> None:
+        """Closes from the open hand towards the grasp's joints, then on until contact or limit decides.
+
+        On the way to the grasp's joints all fingers arrive together; from there on they close at one
+        speed. No target runs more than `lead` ahead of its joint.
+        """
+        closing, scene = self._hand.closing, self._scene
+        step = closing.speed * self._physics.control_period
+        target = self._hand.open(joints)
+        way = joints - target
+        arriving = max(round(way.max() / step), 1)
+        for k in range(round(closing.duration / self._physics.control_period)):
+            measured = scene.data.qpos[scene.joint_qpos]
+            advanced = target + (way / arriving if k < arriving else step * closing.moves)
+            limit = np.minimum(measured + closing.lead, self._hand.upper)
+            target = np.where(closing.moves > 0, np.maximum(target, np.minimum(advanced, limit)), target)
+            scene.data.ctrl[scene.actuators] = target
+            self._advance()
+        for _ in range(round(closing.squeeze / self._physics.control_period)):
+            self._advance()
+
+    def _advance(self) -> None:
+        mujoco.mj_step(self._scene.model, self._scene.data, self._steps)
+
+    def _object_position(self) -> Float[np.ndarray, "3"]:
+        """Centre of mass of the object, world frame."""
+        return self._scene.data.xipos[self._scene.object_body].copy()
+
+    def _touching(self) -> tuple[int, bool]:
+        """How many hand links touch the object, and whether the table does."""
+        scene = self._scene
+        geoms = scene.data.contact.geom
+        owners = scene.geom_owner[geoms]
+        touches_object = (owners == OBJECT).any(axis=1)
+        by_hand = touches_object & (owners == HAND).any(axis=1)
+        hand_geoms = geoms[by_hand][owners[by_hand] == HAND]
+        links = len(set(scene.model.geom_bodyid[hand_geoms].tolist()))
+        on_table = bool((touches_object & (owners == TABLE).any(axis=1)).any())
+        return links, on_table
+
+
+def _quintic(duration: float, period: float) -> Float[np.ndarray, " K"]:
+    """Smooth path from 0 to 1 that starts and ends at rest, one value per control period."""
+    s = np.linspace(0, 1, max(round(duration / period), 1) + 1)[1:]
+    return s**3 * (10 - 15 * s + 6 * s**2)
