@@ -1,0 +1,73 @@
+"""From what a user names (`--objects NAME|DIR`) to objects, each built only when it is needed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import cast
+
+from ffhnet.errors import ObjectError
+from ffhnet.objects.grasp_object import GraspObject
+from ffhnet.objects.procedural import FIRST_SEED, Split, make_object, object_name, procedural_split, seed_of
+from ffhnet.objects.scans import find_meshes, load_scan
+
+DEFAULT_COUNT = 100
+"""Objects of a procedural split where the user names no number."""
+
+
+@dataclass(frozen=True)
+class ObjectSource:
+    """An object that is not built yet; can be sent to another process.
+
+    Attributes:
+        name: of the object.
+        load: builds it; raises what `make_object` or `load_scan` raise.
+    """
+
+    name: str
+    load: Callable[[], GraspObject]
+
+
+def resolve_objects(spec: str, cache_dir: str | Path | None = None) -> list[ObjectSource]:
+    """Objects that a specification names.
+
+    Args:
+        spec: "procedural-test" or another split, "procedural-test:20" for its first 20 objects, the name of
+            one procedural object ("bottle_000123"), a mesh file, or a folder of meshes.
+        cache_dir: where convex pieces of scans are kept, the user's cache folder if none.
+
+    Raises:
+        ObjectError: the specification names nothing.
+        InputFileError: a folder without meshes.
+    """
+    if spec.startswith("procedural-"):
+        return [_procedural(seed) for seed in _split_seeds(spec)]
+    path = Path(spec)
+    if path.is_dir():
+        return [_scan(name, file, cache_dir) for name, file in find_meshes(path)]
+    if path.is_file():
+        return [_scan(path.stem, path, cache_dir)]
+    try:
+        return [_procedural(seed_of(spec))]
+    except ObjectError:
+        splits = ", ".join(f"procedural-{split}[:COUNT]" for split in FIRST_SEED)
+        raise ObjectError(
+            f"wanted {splits}, a name such as {object_name(123)}, a mesh file or a folder, got {spec!r}"
+        ) from None
+
+
+def _split_seeds(spec: str) -> list[int]:
+    split, colon, count = spec.removeprefix("procedural-").partition(":")
+    if colon and not (count.isascii() and count.isdigit()):
+        raise ObjectError(f"wanted a number of objects after the colon, got {spec!r}")
+    return procedural_split(cast(Split, split), int(count) if colon else DEFAULT_COUNT)
+
+
+def _procedural(seed: int) -> ObjectSource:
+    return ObjectSource(object_name(seed), partial(make_object, seed))
+
+
+def _scan(name: str, path: Path, cache_dir: str | Path | None) -> ObjectSource:
+    return ObjectSource(name, partial(load_scan, path, cache_dir, name=name))
