@@ -11,7 +11,7 @@ from ffhnet.errors import CloudError, OptionError, SceneError
 from ffhnet.geometry.transforms import apply, invert
 from ffhnet.perception.bps import encode
 from ffhnet.perception.camera import Intrinsics
-from ffhnet.perception.cloud import MIN_POINTS, depth_to_cloud, validate_cloud
+from ffhnet.perception.cloud import MIN_POINTS, depth_to_cloud, finite_rows, validate_cloud
 from ffhnet.perception.segment import MIN_HEIGHT, segment_objects
 from ffhnet.perception.table import Plane, fit_table
 from ffhnet.perception.view_frame import unit, view_frame
@@ -108,14 +108,24 @@ def observe_scene(
         SceneError: no table, no object, or not as many objects.
         OptionError: the mask does not fit the cloud.
     """
-    cloud_camera = np.asarray(cloud_camera)
-    if mask is not None:
-        mask = np.asarray(mask, dtype=bool).ravel()
-        if cloud_camera.ndim < 2 or len(mask) != cloud_camera.size // cloud_camera.shape[-1]:
-            raise OptionError(
-                f"the mask must have one value per point, got {mask.shape} for {cloud_camera.shape}"
-            )
     cloud = validate_cloud(cloud_camera)
+    if mask is not None:
+        if np.shape(mask) != np.shape(cloud_camera)[:-1]:
+            raise OptionError(
+                f"the mask must have one value per point, got {np.shape(mask)} for {np.shape(cloud_camera)}"
+            )
+        rows = np.reshape(cloud_camera, (-1, np.shape(cloud_camera)[-1]))
+        mask = np.ravel(mask).astype(bool)[finite_rows(rows)]
+    return _observe_scene(cloud, rng, object_index, mask)
+
+
+def _observe_scene(
+    cloud: Float[np.ndarray, "N 3"],
+    rng: np.random.Generator,
+    object_index: int,
+    mask: Bool[np.ndarray, " N"] | None,
+) -> Observation:
+    """`observe_scene` of a cloud that is known to be usable."""
     plane = fit_table(cloud, rng)
     if mask is None:
         objects = segment_objects(cloud, plane)
@@ -125,8 +135,7 @@ def observe_scene(
             )
         members = cloud[objects[object_index]]
     else:
-        rows = cloud_camera.reshape(len(mask), -1)[:, :3]
-        members = rows[mask & np.isfinite(rows).all(axis=1)].astype(float)
+        members = cloud[mask]
         members = members[plane.height(members) > MIN_HEIGHT]
         if len(members) < MIN_POINTS:
             raise SceneError(f"wanted {MIN_POINTS} points of the mask above the table, got {len(members)}")
@@ -148,10 +157,10 @@ def observe_depth(
         raise OptionError(
             f"the mask must be of the depth image's size {np.shape(depth)}, got {np.shape(mask)}"
         )
-    chosen = None if mask is None else np.asarray(mask, dtype=bool).ravel()[pixels]
-    if len(cloud) == 0:
-        raise CloudError("the depth image has no reading: all pixels are 0")
-    return observe_scene(cloud, rng, object_index, chosen)
+    chosen = None if mask is None else np.ravel(mask).astype(bool)[pixels]
+    if len(cloud) < MIN_POINTS:
+        raise CloudError(f"a depth image must have at least {MIN_POINTS} readings, got {len(cloud)}")
+    return _observe_scene(cloud, rng, object_index, chosen)
 
 
 def _observation(

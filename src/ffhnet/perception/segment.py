@@ -29,6 +29,12 @@ _LINK = 0.015
 _CELL = 0.02
 """m: cells of the map of the table."""
 
+_MAP_SIZE = 3.0
+"""m: side of that map, around the middle of the table's points."""
+
+_TABLE_SAMPLE = 20000
+"""Points of the table that are enough for its map."""
+
 _MIN_DENSITY = 0.1
 """Share of a cluster's median point density below which points are stray (flying pixels)."""
 
@@ -53,10 +59,11 @@ def segment_objects(
         SceneError: nothing stands on the table.
     """
     height = plane.height(cloud)
-    on_plane = cloud[np.abs(height) < min_height]
+    on_plane = np.flatnonzero(np.abs(height) < min_height)
+    on_plane = on_plane[:: 1 + len(on_plane) // _TABLE_SAMPLE]
     standing = np.flatnonzero((height > min_height) & (height < _MAX_SIZE))
-    if len(on_plane) and len(standing):
-        standing = standing[_inside(plane.coordinates(cloud[standing]), plane.coordinates(on_plane))]
+    over_table = _inside(plane.coordinates(cloud[standing]), plane.coordinates(cloud[on_plane]))
+    standing = standing[over_table]
     seeds = standing[height[standing] > max(_SEED_HEIGHT, min_height)]
     if len(seeds) < MIN_POINTS:
         raise SceneError(
@@ -84,31 +91,30 @@ def _prominence(points: Float[np.ndarray, "N 3"]) -> float:
 
 def _inside(points: Float[np.ndarray, "N 2"], table: Float[np.ndarray, "M 2"]) -> Bool[np.ndarray, " N"]:
     """Which points lie over the largest connected piece of table, holes and notches filled up."""
-    middle = np.median(table, axis=0)
-    cells = np.floor((table - middle) / _CELL).astype(int)
-    reach = int(1.5 / _CELL)
-    cells = cells[np.abs(cells).max(axis=1) < reach] + reach
-    seen = np.zeros((2 * reach, 2 * reach), dtype=bool)
-    seen[cells[:, 0], cells[:, 1]] = True
-    # One cell of closing joins table parts that a thin shadow separates.
-    pieces, count = ndimage.label(ndimage.binary_dilation(seen), structure=np.ones((3, 3)))
-    if count == 0:
+    if len(table) == 0:
         return np.zeros(len(points), dtype=bool)
+    middle = np.median(table, axis=0)
+    half = int(_MAP_SIZE / 2 / _CELL)
+    edges = (np.arange(2 * half + 1) - half) * _CELL
+    seen = np.histogram2d(*(table - middle).T, bins=[edges, edges])[0] > 0
+    # One cell of closing joins table parts that a thin shadow separates.
+    pieces, _ = ndimage.label(ndimage.binary_dilation(seen), structure=np.ones((3, 3)))
     largest = 1 + int(np.argmax(np.bincount(pieces.ravel())[1:]))
-    corners = (np.argwhere(seen & (pieces == largest)) + 0.5 - reach) * _CELL + middle
+    corners = (np.argwhere(seen & (pieces == largest)) + 0.5 - half) * _CELL + middle
     try:
         sides = ConvexHull(corners).equations
     except QhullError:
         return np.zeros(len(points), dtype=bool)
-    return (points @ sides[:, :2].T + sides[:, 2] < _CELL / 2).all(axis=1)
+    return (sides[:, :2] @ points.T + sides[:, 2:] < _CELL / 2).all(axis=0)
 
 
 def _clusters(points: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
     """Label of each point's Euclidean cluster, -1 for stray points."""
-    cells, voxel_of, counts = np.unique(
-        np.floor(points / _VOXEL).astype(int), axis=0, return_inverse=True, return_counts=True
-    )
-    voxel_of = voxel_of.ravel()
+    cells = np.floor((points - points.min(axis=0)) / _VOXEL).astype(int)
+    # One number per voxel, because sorting rows is slow.
+    keys = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
+    _, first, voxel_of, counts = np.unique(keys, return_index=True, return_inverse=True, return_counts=True)
+    cells = cells[first]
     n = len(cells)
     pairs = cKDTree(cells * _VOXEL).query_pairs(_LINK, output_type="ndarray")
     links = sparse.coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n)).tocsr()
