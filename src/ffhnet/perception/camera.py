@@ -151,7 +151,7 @@ def _table_depth(
     """Depth of the table's plane in each pixel, inf beside and behind the table."""
     x, y = intrinsics.rays()
     rotation, eye = T_world_camera[:3, :3], T_world_camera[:3, 3]
-    in_world = [rotation[i, 0] * x[None, :] + rotation[i, 1] * y[:, None] + rotation[i, 2] for i in range(3)]
+    in_world = [rotation[i, 0] * x + (rotation[i, 1] * y + rotation[i, 2])[:, None] for i in range(3)]
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = -eye[2] / in_world[2]
         seen = depth > 0

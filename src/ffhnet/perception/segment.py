@@ -15,9 +15,13 @@ from ffhnet.perception.table import Plane
 MIN_HEIGHT = 0.005
 """m above the table: lower points are taken for table, being within the noise of real cameras."""
 
-_SEED_HEIGHT = 0.01
-"""m: clusters are made of points above this, so that bumps of the table do not bridge two objects; their
-lower points come after."""
+_SEED_SD = 3.0
+_MAX_SEED_HEIGHT = 0.01
+"""Clusters are made of points so many standard deviations of the table's noise above `MIN_HEIGHT`, at most
+so many metres above the table, so that its bumps do not bridge objects; their lower points come after."""
+
+_LOW_REACH = 0.01
+"""m from a cluster within which lower points belong to it."""
 
 _MAX_SIZE = 0.6
 """m: nothing higher or wider is an object for a hand; walls and arms are."""
@@ -41,14 +45,18 @@ _MIN_DENSITY = 0.1
 _CENTRE_WIDTH = 0.4
 """rad off the optical axis at which an object counts e times less than in the middle."""
 
+_BORDER = 0.005
+"""In focal lengths: an object so near to the edge of the view is cut off by it."""
+
 
 def segment_objects(
     cloud: Float[np.ndarray, "N 3"], plane: Plane, min_height: float = MIN_HEIGHT
 ) -> list[Int[np.ndarray, " M"]]:
     """Indices of the points of each object that stands on the table, the main object first.
 
-    Main is what has many points and is near the optical axis. Things beside the table (walls, the
-    floor's furniture) and things larger than 0.6 m are left out.
+    Main is what has many points and is near the optical axis; what the edge of the view cuts off (often
+    the robot itself) comes last. Things beside the table (walls, furniture) and things larger than 0.6 m
+    are left out.
 
     Args:
         cloud: the scene (m) in the camera frame.
@@ -64,14 +72,16 @@ def segment_objects(
     standing = np.flatnonzero((height > min_height) & (height < _MAX_SIZE))
     over_table = _inside(plane.coordinates(cloud[standing]), plane.coordinates(cloud[on_plane]))
     standing = standing[over_table]
-    seeds = standing[height[standing] > max(_SEED_HEIGHT, min_height)]
+    noise = 1.48 * float(np.median(np.abs(height[on_plane]))) if len(on_plane) else 0.0
+    seed_height = max(min_height, min(min_height + _SEED_SD * noise, _MAX_SEED_HEIGHT))
+    seeds = standing[height[standing] > seed_height]
     if len(seeds) < MIN_POINTS:
         raise SceneError(
-            f"no object on the table: wanted {MIN_POINTS} points above {1000 * _SEED_HEIGHT:.0f} mm, "
+            f"no object on the table: wanted {MIN_POINTS} points above {1000 * seed_height:.0f} mm, "
             f"got {len(seeds)}"
         )
     labels = _clusters(cloud[seeds])
-    low = standing[height[standing] <= max(_SEED_HEIGHT, min_height)]
+    low = standing[height[standing] <= seed_height]
     found = []
     for members, foot in _with_low_points(cloud, seeds, labels, low):
         size = np.ptp(cloud[members], axis=0).max()
@@ -79,7 +89,20 @@ def segment_objects(
             found.append(np.sort(np.concatenate([members, foot])))
     if not found:
         raise SceneError(f"no object on the table: no cluster of {MIN_POINTS} points below {_MAX_SIZE} m")
-    return sorted(found, key=lambda members: -_prominence(cloud[members]))
+    view = _bearings(cloud[:: 1 + len(cloud) // _TABLE_SAMPLE])
+    low_edge, high_edge = view.min(axis=0) + _BORDER, view.max(axis=0) - _BORDER
+
+    def rank(members: Int[np.ndarray, " M"]) -> tuple[bool, float]:
+        bearings = _bearings(cloud[members])
+        cut_off = bool(((bearings.min(axis=0) < low_edge) | (bearings.max(axis=0) > high_edge)).any())
+        return cut_off, -_prominence(cloud[members])
+
+    return sorted(found, key=rank)
+
+
+def _bearings(points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 2"]:
+    """Where points appear in an image of focal length 1, right of and below the optical axis."""
+    return points[:, :2] / np.maximum(points[:, 2:], 1e-6)
 
 
 def _prominence(points: Float[np.ndarray, "N 3"]) -> float:
@@ -96,7 +119,7 @@ def _inside(points: Float[np.ndarray, "N 2"], table: Float[np.ndarray, "M 2"]) -
     middle = np.median(table, axis=0)
     half = int(_MAP_SIZE / 2 / _CELL)
     edges = (np.arange(2 * half + 1) - half) * _CELL
-    seen = np.histogram2d(*(table - middle).T, bins=[edges, edges])[0] > 0
+    seen = np.histogramdd(table - middle, bins=[edges, edges])[0] > 0
     # One cell of closing joins table parts that a thin shadow separates.
     pieces, _ = ndimage.label(ndimage.binary_dilation(seen), structure=np.ones((3, 3)))
     largest = 1 + int(np.argmax(np.bincount(pieces.ravel())[1:]))
@@ -136,7 +159,7 @@ def _with_low_points(
     seeds, labels = seeds[kept], labels[kept]
     owner = np.full(len(low), -1)
     if len(low) and len(seeds):
-        distance, nearest = search_tree(cloud[seeds]).query(cloud[low], distance_upper_bound=_SEED_HEIGHT)
+        distance, nearest = search_tree(cloud[seeds]).query(cloud[low], distance_upper_bound=_LOW_REACH)
         near = np.isfinite(distance)
         owner[near] = labels[nearest[near]]
     return [(seeds[labels == label], low[owner == label]) for label in np.unique(labels)]

@@ -24,6 +24,14 @@ _MIN_SHARE = 0.05
 _MAX_TILT_DEGREES = {"guess": 80.0, "hint": 25.0}
 """Largest angle between the table's normal and the guessed or the given up direction."""
 
+_TABLE_ABOVE_FLOOR = 0.3
+"""m: a parallel plane so far above another is a table on a floor; boxes on a table are lower."""
+
+_TABLE_TO_FLOOR = 0.25
+"""Least share of the floor's score that such a table must have."""
+
+_PARALLEL_DEGREES = 10.0
+
 _CAMERA_UP_GUESS = np.array([0.0, -1.0, -1.0]) / np.sqrt(2)
 """Camera frame: half way between the up of a level camera (-y) and of one that looks straight down (-z)."""
 
@@ -73,7 +81,7 @@ def fit_table(
         threshold: largest distance (m) of a point that supports a plane.
 
     Raises:
-        SceneError: no plane of a table's direction holds 5 % of the points.
+        SceneError: no plane whose normal can be a table's holds 5 % of the points.
     """
     if len(cloud) < 3:
         raise SceneError(f"a table plane wants at least 3 points, got {len(cloud)}")
@@ -89,20 +97,32 @@ def fit_table(
     cosine = normals @ up
     allowed = cosine > np.cos(np.radians(limit))
     support = _support(sample, normals, offsets, threshold)
-    score = np.where(allowed, support * cosine, 0.0)
-    best = int(np.argmax(score))
-    if support[best] < _MIN_SHARE or not allowed[best]:
-        share = 100 * support[allowed].max() if allowed.any() else 0.0
+    allowed &= support >= _MIN_SHARE
+    if not allowed.any():
+        share = 100 * max(support, default=0.0)
         raise SceneError(
             f"no table in the scene: wanted a plane with {100 * _MIN_SHARE:.0f} % of the points, "
             f"the best holds {share:.1f} %; for an object already cut out give the up direction"
         )
+    score = np.where(allowed, support * cosine, 0.0)
+    best = _above_floor(normals, offsets, score)
     plane = Plane(normals[best], float(offsets[best]))
     dense = cloud[rng.integers(len(cloud), size=_REFINE_SAMPLE)]
     # The last round leaves out the lowest centimetre of the objects, which would lift the plane.
     for reach in (threshold, threshold, threshold / 2):
         plane = _refit(dense, plane, reach)
     return plane
+
+
+def _above_floor(
+    normals: Float[np.ndarray, "K 3"], offsets: Float[np.ndarray, " K"], score: Float[np.ndarray, " K"]
+) -> int:
+    """The plane of the best score, or if that is a floor, the best of the tables that stand on it."""
+    best = int(np.argmax(score))
+    parallel = normals @ normals[best] > np.cos(np.radians(_PARALLEL_DEGREES))
+    higher = offsets - offsets[best] > _TABLE_ABOVE_FLOOR
+    tables = np.where(parallel & higher & (score > _TABLE_TO_FLOOR * score[best]), score, 0.0)
+    return int(np.argmax(tables)) if tables.any() else best
 
 
 def _support(
