@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from ffhnet.evaluation.shapes import (
     frame_surfaces,
     hand_surfaces,
 )
+from ffhnet.files import write_atomically
 from ffhnet.geometry.rotations import geodesic_angle
 from ffhnet.geometry.transforms import invert, make_transform
 from ffhnet.grasps import Grasps
@@ -138,7 +140,14 @@ def grasp_picture(
         "Palm axes: x red (approach), y green, z blue. Squares: 5 cm."
     )
     draw.text((_GAP + 4, _HEADER + _BIG + _FOOTER // 2), note, fill=_FAINT, font=_font(16), anchor="lm")
-    canvas.save(path, format="PNG")
+    save_png(canvas, path)
+
+
+def save_png(picture: Image.Image, path: str | Path) -> None:
+    """Write a picture as PNG, whole or not at all; raises OptionError where that cannot be done."""
+    buffer = io.BytesIO()
+    picture.save(buffer, format="PNG")
+    write_atomically(path, buffer.getvalue())
 
 
 def _clearest_side(cloud: _Cloud, grasps: Grasps, index: int, hand: Hand) -> float:
