@@ -116,6 +116,8 @@ class TrainingConfig:
     def kl_weight_at(self, step: int) -> float:
         """Weight of the KL term at a step."""
         done = step / self.steps
+        if done < self.kl_start:
+            return 0.0
         if done >= self.kl_full:
             return self.kl_weight
-        return self.kl_weight * max(0.0, done - self.kl_start) / (self.kl_full - self.kl_start)
+        return self.kl_weight * (done - self.kl_start) / (self.kl_full - self.kl_start)

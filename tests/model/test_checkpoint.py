@@ -1,0 +1,135 @@
+"""Checkpoints: round trip, 16-bit storage, and every kind of damage."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from ffhnet.errors import OptionError, WeightsError
+from ffhnet.model import (
+    CheckpointInfo,
+    FFHEvaluator,
+    FFHGenerator,
+    ModelConfig,
+    load_checkpoint,
+    save_checkpoint,
+)
+from ffhnet.model.pca import Projection
+
+MODEL = ModelConfig(num_joints=2, bps_size=16, pca_components=4, inner_width=8, width=12)
+INFO = CheckpointInfo("some_hand", ("a", "b"), (0.0, -0.2), (1.0, 0.2), MODEL, training={"note": [1, 2]})
+
+
+@pytest.fixture
+def networks() -> tuple[FFHGenerator, FFHEvaluator]:
+    torch.manual_seed(0)
+    generator, evaluator = FFHGenerator(MODEL), FFHEvaluator(MODEL)
+    rng = np.random.default_rng(0)
+    for network in (generator, evaluator):
+        network.condition.set_projection(Projection(rng.random(16), rng.normal(size=(16, 4))))
+        for buffer in network.buffers():
+            if buffer.ndim == 1:
+                buffer.copy_(torch.rand(len(buffer)) * 1e-9)
+    return generator, evaluator
+
+
+@pytest.fixture
+def folder(tmp_path: Path, networks: tuple[FFHGenerator, FFHEvaluator]) -> Path:
+    save_checkpoint(tmp_path / "weights", INFO, *networks)
+    return tmp_path / "weights"
+
+
+def test_round_trip_is_exact(folder: Path, networks: tuple[FFHGenerator, FFHEvaluator]):
+    loaded = load_checkpoint(folder, hand="some_hand")
+    assert loaded.info == INFO
+    for before, after in zip(networks, (loaded.generator, loaded.evaluator), strict=True):
+        assert not after.training
+        wanted = before.state_dict()
+        assert wanted.keys() == after.state_dict().keys()
+        for name, tensor in after.state_dict().items():
+            assert torch.equal(tensor, wanted[name]), name
+
+
+def test_half_precision_halves_matrices_and_keeps_tiny_variances(tmp_path: Path, folder: Path, networks):
+    save_checkpoint(tmp_path / "half", INFO, *networks, half=True)
+    loaded = load_checkpoint(tmp_path / "half")
+    wanted = networks[1].state_dict()
+    for name, tensor in loaded.evaluator.state_dict().items():
+        assert tensor.dtype == wanted[name].dtype
+        torch.testing.assert_close(tensor, wanted[name], rtol=1e-3 if tensor.ndim >= 2 else 0, atol=0)
+    full_size = (folder / "evaluator.safetensors").stat().st_size
+    assert (tmp_path / "half" / "evaluator.safetensors").stat().st_size < full_size
+
+
+def test_networks_can_be_saved_one_after_the_other(tmp_path: Path, networks):
+    generator, evaluator = networks
+    save_checkpoint(tmp_path, dataclasses.replace(INFO, training={"generator": 1}), generator=generator)
+    with pytest.raises(WeightsError, match=r"evaluator\.safetensors is missing"):
+        load_checkpoint(tmp_path)
+    save_checkpoint(tmp_path, dataclasses.replace(INFO, training={"evaluator": 2}), evaluator=evaluator)
+    assert load_checkpoint(tmp_path).info.training == {"generator": 1, "evaluator": 2}
+
+
+def test_a_folder_is_not_shared_by_two_hands(folder: Path, networks):
+    other = dataclasses.replace(INFO, hand="other")
+    with pytest.raises(WeightsError, match="another hand"):
+        save_checkpoint(folder, other, *networks)
+
+
+def test_weights_of_another_hand(folder: Path):
+    with pytest.raises(WeightsError, match=r"wanted weights for hand 'other'.*'some_hand'"):
+        load_checkpoint(folder, hand="other")
+
+
+def test_missing_folder(tmp_path: Path):
+    with pytest.raises(WeightsError, match=r"config\.json is missing"):
+        load_checkpoint(tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize("name", ["generator.safetensors", "evaluator.safetensors"])
+@pytest.mark.parametrize("damage", ["truncate", "flip", "empty", "remove"])
+def test_damaged_weights(folder: Path, name: str, damage: str):
+    path = folder / name
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    if damage == "remove":
+        path.unlink()
+    else:
+        path.write_bytes({"truncate": bytes(data[:-7]), "flip": bytes(data), "empty": b""}[damage])
+    with pytest.raises(WeightsError, match=name):
+        load_checkpoint(folder)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "[]",
+        "{}",
+        "null",
+        '{"format": 1}',
+        '{"format": 9}',
+        '{"format": 1, "sha256": {}, "model": {}}',
+    ],
+)
+def test_damaged_description(folder: Path, text: str):
+    (folder / "config.json").write_text(text)
+    with pytest.raises(WeightsError, match=r"config\.json"):
+        load_checkpoint(folder)
+
+
+def test_weights_that_do_not_fit_the_description(folder: Path):
+    content = json.loads((folder / "config.json").read_text())
+    content["model"]["width"] += 1
+    (folder / "config.json").write_text(json.dumps(content))
+    with pytest.raises(WeightsError, match="does not fit the architecture"):
+        load_checkpoint(folder)
+
+
+def test_limits_must_fit_the_joints():
+    with pytest.raises(OptionError, match="1 lower"):
+        dataclasses.replace(INFO, joint_lower=(0.0,))
