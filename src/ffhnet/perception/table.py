@@ -97,12 +97,13 @@ def fit_table(
     cosine = normals @ up
     allowed = cosine > np.cos(np.radians(limit))
     support = _support(sample, normals, offsets, threshold)
+    share = 100 * support[allowed].max(initial=0.0)
     allowed &= support >= _MIN_SHARE
     if not allowed.any():
-        share = 100 * max(support, default=0.0)
         raise SceneError(
-            f"no table in the scene: wanted a plane with {100 * _MIN_SHARE:.0f} % of the points, "
-            f"the best holds {share:.1f} %; for an object already cut out give the up direction"
+            "no table in the scene: wanted a plane that faces the camera or up, with "
+            f"{100 * _MIN_SHARE:.0f} % of the points, the best holds {share:.1f} %; "
+            "for an object already cut out give the up direction"
         )
     score = np.where(allowed, support * cosine, 0.0)
     best = _above_floor(normals, offsets, score)
