@@ -45,7 +45,8 @@ def resolve_objects(spec: str, cache_dir: str | Path | None = None) -> list[Obje
     if spec.startswith("procedural-"):
         return [_procedural(seed) for seed in _split_seeds(spec)]
     path = Path(spec)
-    if path.is_dir():
+    # The path of an empty text is the working folder.
+    if spec and path.is_dir():
         return [_scan(name, file, cache_dir) for name, file in find_meshes(path)]
     if path.is_file():
         return [_scan(path.stem, path, cache_dir)]

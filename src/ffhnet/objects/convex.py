@@ -33,7 +33,7 @@ def convex_hull(points: Float[np.ndarray, "n 3"]) -> trimesh.Trimesh:
 
 
 def rounded_rectangle(half_x: float, half_y: float, radius: float) -> Float[np.ndarray, "24 2"]:
-    """Rectangle of half sides (half_x, half_y) with rounded corners; a regular polygon where all are equal."""
+    """Rectangle of half sides (half_x, half_y) with round corners; a regular polygon if all are equal."""
     per_corner = SIDES // 4
     half_step = np.pi / SIDES
     angles = np.arange(SIDES) * 2 * half_step + half_step

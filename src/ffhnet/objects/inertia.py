@@ -22,7 +22,7 @@ class MassProperties(NamedTuple):
     """
 
     mass: float
-    centre: Float[np.ndarray, "3"]
+    centre: Float[np.ndarray, " 3"]
     inertia: Float[np.ndarray, "3 3"]
 
 

@@ -66,7 +66,7 @@ class _Hull:
         self.final = _ends_of_falls(self.points[hull.simplices], self.normals, self.heights, hull.neighbors)
         self._signatures: dict[int, np.ndarray] = {}
 
-    def settle(self, down: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, "n"]:
+    def settle(self, down: Float[np.ndarray, "n 3"]) -> Int[np.ndarray, " n"]:
         """Facet on which the object rests after being let go with these directions (units) below."""
         along = down @ self.normals.T
         distance = np.divide(self.heights, along, out=np.full_like(along, np.inf), where=along > 1e-9)
@@ -76,7 +76,7 @@ class _Hull:
         """Whether two poses differ by no more than a turn about z or the facet of a round side."""
         return bool(np.abs(self._signature(facet) - self._signature(other)).max() < LIKENESS)
 
-    def _signature(self, facet: int) -> Float[np.ndarray, "5"]:
+    def _signature(self, facet: int) -> Float[np.ndarray, " 5"]:
         """Lengths (m) that describe a pose: height of the centre, full height, radii of gyration."""
         if facet in self._signatures:
             return self._signatures[facet]
@@ -93,9 +93,9 @@ class _Hull:
 def _ends_of_falls(
     corners: Float[np.ndarray, "f 3 3"],
     normals: Float[np.ndarray, "f 3"],
-    heights: Float[np.ndarray, "f"],
+    heights: Float[np.ndarray, " f"],
     neighbours: Int[np.ndarray, "f 3"],
-) -> Int[np.ndarray, "f"]:
+) -> Int[np.ndarray, " f"]:
     """Facet on which an object that starts on each facet comes to rest."""
     foot = normals * heights[:, None]
     # Edge k lies opposite corner k, as qhull numbers the neighbours.
@@ -147,7 +147,7 @@ def resting_poses(pieces: Sequence[trimesh.Trimesh], max_lying: int = 4) -> tupl
 
 
 def _groups(hull: _Hull, first: int | None) -> dict[int, float]:
-    """Probability of each group of like poses, under the facet that leads it (`first`, then the likeliest)."""
+    """Probability of each group of like poses, under its leading facet: `first`, or else the likeliest."""
     facets, counts = np.unique(hull.settle(_sphere(1500)), return_counts=True)
     shares = dict(zip(facets.tolist(), (counts / counts.sum()).tolist(), strict=True))
     order = sorted(shares, key=lambda facet: (facet != first, -shares[facet]))
@@ -191,7 +191,7 @@ def _sphere(count: int) -> Float[np.ndarray, "n 3"]:
     return np.column_stack([radius * np.cos(turn), radius * np.sin(turn), z])
 
 
-def _cone(axis: Float[np.ndarray, "3"], half_angle: float, count: int = 24) -> Float[np.ndarray, "n 3"]:
+def _cone(axis: Float[np.ndarray, " 3"], half_angle: float, count: int = 24) -> Float[np.ndarray, "n 3"]:
     """Directions at one angle to an axis."""
     across = np.linalg.svd(axis[None])[2][1:]
     turn = np.arange(count) * 2 * np.pi / count

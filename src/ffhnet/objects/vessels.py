@@ -156,8 +156,8 @@ def spray_flask(rng: np.random.Generator) -> Pieces:
                        (0.3 * reach, brow), (back, brow - 0.006)], wide)  # fmt: skip
     nozzle = extrude_xz([(reach, brow - 0.014), (reach + 0.01, brow - 0.014),
                          (reach + 0.01, brow - 0.004), (reach, brow - 0.004)], 0.007)  # fmt: skip
-    # The trigger hangs under the head in front of the collar and swings forward.
-    hinge, tip = collar + 0.003, chin - mm(rng, 30, 42)
+    # The trigger hangs under the head in front of the collar and ends above the shoulder.
+    hinge, tip = collar + 0.003, chin - mm(rng, 19, 25)
     trigger = extrude_xz([(hinge, chin), (hinge + 0.011, chin), (hinge + 0.019, tip), (hinge + 0.010, tip)],
                          0.006)  # fmt: skip
     return [*stack(rings), head, nozzle, trigger]
