@@ -90,19 +90,20 @@ def segment_objects(
     if not found:
         raise SceneError(f"no object on the table: no cluster of {MIN_POINTS} points below {_MAX_SIZE} m")
     view = _bearings(cloud[:: 1 + len(cloud) // _TABLE_SAMPLE])
-    low_edge, high_edge = view.min(axis=0) + _BORDER, view.max(axis=0) - _BORDER
+    low_edge, high_edge = view.min(axis=1) + _BORDER, view.max(axis=1) - _BORDER
 
     def rank(members: Int[np.ndarray, " M"]) -> tuple[bool, float]:
         bearings = _bearings(cloud[members])
-        cut_off = bool(((bearings.min(axis=0) < low_edge) | (bearings.max(axis=0) > high_edge)).any())
+        cut_off = bool(((bearings.min(axis=1) < low_edge) | (bearings.max(axis=1) > high_edge)).any())
         return cut_off, -_prominence(cloud[members])
 
     return sorted(found, key=rank)
 
 
-def _bearings(points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 2"]:
+def _bearings(points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "2 N"]:
     """Where points appear in an image of focal length 1, right of and below the optical axis."""
-    return points[:, :2] / np.maximum(points[:, 2:], 1e-6)
+    x, y, z = points.T
+    return np.stack([x, y]) / np.maximum(z, 1e-6)
 
 
 def _prominence(points: Float[np.ndarray, "N 3"]) -> float:
