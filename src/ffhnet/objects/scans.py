@@ -145,7 +145,7 @@ def _checked(mesh: trimesh.Trimesh, scale: float, path: Path) -> trimesh.Trimesh
     if not np.isfinite(vertices).all():
         raise ObjectError(f"wanted finite vertices, {path} has NaN or infinite ones")
     _check_size(vertices[np.unique(faces)], path)
-    mesh = _closed(trimesh.Trimesh(vertices, faces), path)
+    mesh = _closed(trimesh.Trimesh(vertices, faces, process=False), path)
     mesh.vertices[:, 2] -= mesh.vertices[:, 2].min()
     return mesh
 
@@ -163,11 +163,12 @@ def _check_size(vertices: np.ndarray, path: Path) -> None:
 
 
 def _closed(mesh: trimesh.Trimesh, path: Path) -> trimesh.Trimesh:
-    """The mesh without double vertices and faces, repaired where it has small holes or flipped faces."""
-    mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    mesh.update_faces(mesh.unique_faces() & mesh.nondegenerate_faces())
-    mesh.remove_unreferenced_vertices()
+    """The mesh with outward faces, repaired only where it needs be: cleaning can open a closed mesh."""
     if not mesh.is_watertight:
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    if not mesh.is_watertight:
+        mesh.update_faces(mesh.unique_faces() & mesh.nondegenerate_faces())
+        mesh.remove_unreferenced_vertices()
         trimesh.repair.fill_holes(mesh)
     trimesh.repair.fix_normals(mesh, multibody=True)
     if not mesh.is_watertight:
