@@ -63,21 +63,20 @@ def _to_json(grasps: Grasps) -> bytes:
         probability,
         strict=True,
     )
-    content = {
-        "hand": grasps.hand,
-        "frame": grasps.frame,
-        "joint_names": list(grasps.joint_names),
-        "grasps": [
+    lines = [
+        json.dumps(
             {
                 "palm_position": position,
                 "palm_quaternion_wxyz": quaternion,
                 "joint_angles": joints,
                 "success_probability": success,
             }
-            for position, quaternion, joints, success in rows
-        ],
-    }
-    return (json.dumps(content, indent=1) + "\n").encode()
+        )
+        for position, quaternion, joints, success in rows
+    ]
+    header = json.dumps({"hand": grasps.hand, "frame": grasps.frame, "joint_names": list(grasps.joint_names)})
+    # One grasp per line: indented JSON would take a line for each number.
+    return (header[:-1] + ', "grasps": [\n' + ",\n".join(lines) + "\n]}\n").encode()
 
 
 def _to_npz(grasps: Grasps) -> bytes:

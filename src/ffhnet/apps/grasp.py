@@ -20,6 +20,12 @@ if TYPE_CHECKING:
 
 _SHOWN = 10
 
+_INPUT_HELP = (
+    "Point cloud in metres (.pcd .ply .npy .npz), or depth image (.png .npy .npz) with its intrinsics. "
+    "A depth image, or a cloud without --up and --world, shows a whole scene with a table in the camera's "
+    "frame: x right, y down, z forward. With one of the two a cloud is a single object, already cut out."
+)
+
 _Vector = Annotated[tuple[float, float, float] | None, absent("X Y Z")]
 _File = Annotated[Path | None, absent("FILE")]
 
@@ -28,10 +34,7 @@ _File = Annotated[Path | None, absent("FILE")]
 class GraspOptions:
     """Grasps for one object, ranked by the probability that they hold."""
 
-    input: Annotated[Path, tyro.conf.Positional]
-    """Point cloud in metres (.pcd .ply .npy .npz), or depth image (.png .npy .npz) with its intrinsics. A
-    depth image, or a cloud without up and world, shows a whole scene with a table in the frame of the camera:
-    x right, y down, z forward. With one of the two a cloud is a single object, already cut out."""
+    input: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(help=_INPUT_HELP)]
     up: _Vector = None
     """The cloud is an object already cut out; this is the direction against gravity in its frame."""
     world: bool = False
