@@ -112,6 +112,8 @@ def _set_options(spec: mujoco.MjSpec, physics: Physics) -> None:
     option.ls_iterations = 50
     option.tolerance = 1e-8
     option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    # One contact point for each pair of shapes: fingers are capsules, and the labels stay the same.
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_MULTICCD
 
 
 def _index(hand: Hand, obj: GraspObject, physics: Physics, model: mujoco.MjModel) -> Scene:

@@ -14,6 +14,11 @@ from ffhnet.grasps import Grasps
 from ffhnet.simulation.scene import HAND, OBJECT, TABLE, Scene
 
 
+SETTLE_PERIODS = 6
+SETTLE_MOTION = 0.004
+"""rad: closing ends early when no joint has moved further during SETTLE_PERIODS control periods."""
+
+
 class Outcome(IntEnum):
     """What became of a trial. All but SUCCESS are failures."""
 
@@ -187,8 +192,14 @@ class GraspTrial:
         target = self._hand.open(joints)
         way = joints - target
         arriving = max(round(way.max() / step), 1)
+        settled = self._hand.open(joints)
         for k in range(round(closing.duration / self._physics.control_period)):
             measured = scene.data.qpos[scene.joint_qpos]
+            if k > arriving and k % SETTLE_PERIODS == 0:
+                # Every finger stands still, against the object or its limit: waiting on changes nothing.
+                if np.abs(measured - settled).max() < SETTLE_MOTION:
+                    break
+                settled = measured.copy()
             advanced = target + (way / arriving if k < arriving else step * closing.moves)
             limit = np.minimum(measured + closing.lead, self._hand.upper)
             target = np.where(closing.moves > 0, np.maximum(target, np.minimum(advanced, limit)), target)

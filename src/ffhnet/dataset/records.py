@@ -1,0 +1,226 @@
+"""Parquet files of a data set: one row per trial, one row per view.
+
+A data set is a folder with `trials/*.parquet`, `views/*.parquet` and `dataset.json` (hand, joint order and
+the settings it was made with). Any number of files may lie in the two folders: generation writes one pair per
+object, `pack` joins them. See `docs/data.md` for every column.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from jaxtyping import Float
+
+from ffhnet.dataset.training_data import TrainingData
+from ffhnet.errors import DatasetError
+from ffhnet.geometry.rotations import matrix_from_quaternion, quaternion_from_matrix
+from ffhnet.grasps import Grasps
+from ffhnet.simulation.trial import Outcome, TrialResults
+
+FORMAT = 1
+PROPOSERS = ("heuristic", "power", "perturb", "learned")
+
+
+@dataclass(frozen=True)
+class ViewRow:
+    """One view of one placement: what the networks are given.
+
+    Attributes:
+        bps: BPS encoding in the view frame, m.
+        table_height: z of the table in the view frame, m.
+        T_world_view: pose of the view frame in the world.
+    """
+
+    bps: Float[np.ndarray, " 4096"]
+    table_height: float
+    T_world_view: Float[np.ndarray, "4 4"]
+
+
+@dataclass(frozen=True)
+class TrialBlock:
+    """Trials of one proposer on one placement; grasps in the world frame."""
+
+    placement: int
+    proposer: str
+    grasps: Grasps
+    results: TrialResults
+
+
+def trials_table(object_name: str, blocks: list[TrialBlock]) -> pa.Table:
+    """Arrow table of trials."""
+    tables = []
+    for block in blocks:
+        grasps, results = block.grasps, block.results
+        n = len(grasps)
+        tables.append(
+            pa.table(
+                {
+                    "object": pa.array([object_name] * n).dictionary_encode(),
+                    "placement": pa.array(np.full(n, block.placement, np.int8)),
+                    "proposer": pa.array([block.proposer] * n).dictionary_encode(),
+                    "position": _lists(grasps.position, np.float32),
+                    "quaternion_wxyz": _lists(quaternion_from_matrix(grasps.rotation), np.float32),
+                    "joints": _lists(grasps.joints, np.float16),
+                    "outcome": pa.array([Outcome(o).name.lower() for o in results.outcome]).dictionary_encode(),
+                    "closed_joints": _lists(results.closed_joints, np.float16),
+                    "contact_links": pa.array(results.contact_links.astype(np.int8)),
+                    "pushed": pa.array(results.pushed.astype(np.float32)),
+                    "rise": pa.array(results.rise.astype(np.float32)),
+                    "hold_slip": pa.array(results.hold_slip.astype(np.float32)),
+                }
+            )
+        )
+    return pa.concat_tables(tables).unify_dictionaries()
+
+
+def views_table(object_name: str, placement: int, rows: list[ViewRow]) -> pa.Table:
+    """Arrow table of views."""
+    n = len(rows)
+    return pa.table(
+        {
+            "object": pa.array([object_name] * n).dictionary_encode(),
+            "placement": pa.array(np.full(n, placement, np.int8)),
+            "bps": _lists(np.stack([row.bps for row in rows]), np.float16),
+            "table_height": pa.array(np.array([row.table_height for row in rows], np.float32)),
+            "T_world_view": _lists(np.stack([row.T_world_view.ravel() for row in rows]), np.float32),
+        }
+    )
+
+
+def write_table(table: pa.Table, path: Path) -> None:
+    """Writes a Parquet file so that it is there whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        pq.write_table(table, partial, compression="zstd", compression_level=9)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def write_header(folder: Path, header: dict[str, Any]) -> None:
+    """Writes `dataset.json`, or checks that the existing one agrees.
+
+    Raises:
+        DatasetError: the folder holds a data set made with other settings.
+    """
+    path = folder / "dataset.json"
+    header = {"format": FORMAT, **json.loads(json.dumps(header))}
+    if path.exists():
+        existing = read_header(folder)
+        different = sorted(k for k in header.keys() | existing.keys() if header.get(k) != existing.get(k))
+        if different:
+            raise DatasetError(
+                f"{folder} holds a data set with other settings ({', '.join(different)}): "
+                "choose another folder, or the settings it was started with"
+            )
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(header, indent=2) + "\n")
+
+
+def read_header(folder: Path) -> dict[str, Any]:
+    """The content of `dataset.json`. Raises DatasetError."""
+    path = folder / "dataset.json"
+    try:
+        header = json.loads(path.read_text())
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise DatasetError(f"{folder} is no data set: cannot read dataset.json ({error})") from error
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise DatasetError(f"{path} is not of format {FORMAT}")
+    return header
+
+
+def read_tables(folder: Path, kind: str) -> pa.Table:
+    """All rows of `kind` ("trials" or "views"). Raises DatasetError."""
+    files = sorted((folder / kind).glob("[!.]*.parquet"))
+    if not files:
+        raise DatasetError(f"{folder} holds no {kind}")
+    try:
+        tables = [pq.read_table(file) for file in files]
+    except (OSError, pa.ArrowInvalid) as error:
+        raise DatasetError(f"{folder}: a file of {kind} is damaged ({error})") from error
+    return pa.concat_tables(tables).unify_dictionaries()
+
+
+def pack(source: Path, target: Path) -> None:
+    """Joins the files of a data set into one file of trials and one of views."""
+    header = read_header(source)
+    for kind in ("trials", "views"):
+        write_table(read_tables(source, kind), target / kind / f"{kind}.parquet")
+    write_header(target, {k: v for k, v in header.items() if k != "format"})
+
+
+def read_training_data(folders: list[Path]) -> TrainingData:
+    """The training arrays of one or more data sets of the same hand.
+
+    Placements are matched across the folders by object name and placement number, so that grasps that
+    were tried later are trained with all views of the placement. Raises DatasetError.
+    """
+    headers = [read_header(folder) for folder in folders]
+    if not headers:
+        raise DatasetError("wanted at least one data set, got none")
+    if any((h["hand"], h["joint_names"]) != (headers[0]["hand"], headers[0]["joint_names"]) for h in headers):
+        raise DatasetError("the data sets are of different hands or joint orders")
+    trials = pa.concat_tables([_plain(read_tables(f, "trials")) for f in folders])
+    views = pa.concat_tables([_plain(read_tables(f, "views")) for f in folders])
+
+    view_keys, trial_keys = _placement_keys(views), _placement_keys(trials)
+    placements, view_placement = np.unique(view_keys, return_inverse=True)
+    known = np.isin(trial_keys, placements)
+    trials = trials.filter(pa.array(known))
+    object_of_placement = np.array([key.rpartition("/")[0] for key in placements])
+    objects, placement_object = np.unique(object_of_placement, return_inverse=True)
+
+    outcome = np.array(trials["outcome"].to_pylist())
+    return TrainingData(
+        hand=headers[0]["hand"],
+        joint_names=tuple(headers[0]["joint_names"]),
+        object_names=tuple(objects.tolist()),
+        placement_object=placement_object,
+        view_placement=view_placement,
+        bps=_array(views["bps"]),
+        table_height=views["table_height"].to_numpy(),
+        T_world_view=_array(views["T_world_view"]).reshape(-1, 4, 4).astype(float),
+        trial_placement=np.searchsorted(placements, trial_keys[known]),
+        rotation=matrix_from_quaternion(_array(trials["quaternion_wxyz"])),
+        position=_array(trials["position"]).astype(float),
+        joints=_array(trials["joints"]).astype(float),
+        label=(outcome == "success").astype(float),
+        executed=outcome != "collision",
+        proposer=np.array([PROPOSERS.index(p) for p in trials["proposer"].to_pylist()]),
+    )
+
+
+def _lists(array: np.ndarray, dtype: type) -> pa.FixedSizeListArray:
+    flat = pa.array(np.ascontiguousarray(array, dtype=dtype).ravel())
+    return pa.FixedSizeListArray.from_arrays(flat, array.shape[1])
+
+
+def _array(column: pa.ChunkedArray) -> np.ndarray:
+    size = column.type.list_size
+    return np.concatenate([chunk.flatten().to_numpy().reshape(-1, size) for chunk in column.chunks])
+
+
+def _plain(table: pa.Table) -> pa.Table:
+    """Dictionary columns as plain strings, so that tables of different folders join."""
+    for i, field in enumerate(table.schema):
+        if pa.types.is_dictionary(field.type):
+            table = table.set_column(i, field.name, table[field.name].cast(pa.string()))
+    return table
+
+
+def _placement_keys(table: pa.Table) -> np.ndarray:
+    return np.array(
+        [
+            f"{name}/{number}"
+            for name, number in zip(table["object"].to_pylist(), table["placement"].to_pylist(), strict=True)
+        ]
+    )
