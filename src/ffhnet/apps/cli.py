@@ -17,7 +17,7 @@ from typing import Annotated, Any, Union, cast
 
 import tyro
 
-from ffhnet.apps import grasp, hand, objects
+from ffhnet.apps import evaluate, generate, grasp, hand, objects, train
 from ffhnet.errors import FFHNetError
 
 
@@ -34,6 +34,9 @@ COMMANDS = (
     Command("grasp", grasp.GraspOptions, grasp.run),
     Command("objects", objects.ObjectsOptions, objects.run),
     Command("hand", hand.HandOptions, hand.run),
+    Command("generate", generate.GenerateOptions, generate.run),
+    Command("train", train.TrainOptions, train.run),
+    Command("evaluate", evaluate.EvaluateOptions, evaluate.run),
 )
 
 ERROR_STATUS = 2

@@ -14,17 +14,17 @@ import pyarrow as pa
 
 from ffhnet.dataset.executors import run_jobs
 from ffhnet.dataset.records import TrialBlock, ViewRow, trials_table, views_table, write_header, write_table
-from ffhnet.dataset.views import View, ViewMaker
 from ffhnet.errors import DatasetError, SceneError
 from ffhnet.grasps import Grasps
 from ffhnet.hands import DEFAULT_HAND, load_hand
 from ffhnet.objects.grasp_object import GraspObject
 from ffhnet.objects.procedural import make_object, object_name
-from ffhnet.sampling.heuristic import POWER, PAPER, HeuristicConfig, sample_heuristic
+from ffhnet.sampling.heuristic import PAPER, POWER, HeuristicConfig, sample_heuristic
 from ffhnet.sampling.perturb import perturb
 from ffhnet.simulation.physics import Physics
 from ffhnet.simulation.scene import build_scene
 from ffhnet.simulation.trial import GraspTrial, TrialResults
+from ffhnet.simulation.views import View, ViewMaker
 
 if TYPE_CHECKING:
     from ffhnet.inference.ffhnet import FFHNet

@@ -8,7 +8,6 @@ object, `pack` joins them. See `docs/data.md` for every column.
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from jaxtyping import Float
 
 from ffhnet.dataset.training_data import TrainingData
 from ffhnet.errors import DatasetError
+from ffhnet.files import write_atomically
 from ffhnet.geometry.rotations import matrix_from_quaternion, quaternion_from_matrix
 from ffhnet.grasps import Grasps
 from ffhnet.simulation.trial import Outcome, TrialResults
@@ -58,6 +58,7 @@ def trials_table(object_name: str, blocks: list[TrialBlock]) -> pa.Table:
     tables = []
     for block in blocks:
         grasps, results = block.grasps, block.results
+        outcomes = [Outcome(o).name.lower() for o in results.outcome]
         n = len(grasps)
         tables.append(
             pa.table(
@@ -68,7 +69,7 @@ def trials_table(object_name: str, blocks: list[TrialBlock]) -> pa.Table:
                     "position": _lists(grasps.position, np.float32),
                     "quaternion_wxyz": _lists(quaternion_from_matrix(grasps.rotation), np.float32),
                     "joints": _lists(grasps.joints, np.float16),
-                    "outcome": pa.array([Outcome(o).name.lower() for o in results.outcome]).dictionary_encode(),
+                    "outcome": pa.array(outcomes).dictionary_encode(),
                     "closed_joints": _lists(results.closed_joints, np.float16),
                     "contact_links": pa.array(results.contact_links.astype(np.int8)),
                     "pushed": pa.array(results.pushed.astype(np.float32)),
@@ -97,12 +98,9 @@ def views_table(object_name: str, placement: int, rows: list[ViewRow]) -> pa.Tab
 def write_table(table: pa.Table, path: Path) -> None:
     """Writes a Parquet file so that it is there whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        pq.write_table(table, partial, compression="zstd", compression_level=9)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    buffer = pa.BufferOutputStream()
+    pq.write_table(table, buffer, compression="zstd", compression_level=9)
+    write_atomically(path, buffer.getvalue().to_pybytes())
 
 
 def write_header(folder: Path, header: dict[str, Any]) -> None:
@@ -123,7 +121,7 @@ def write_header(folder: Path, header: dict[str, Any]) -> None:
             )
         return
     folder.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(header, indent=2) + "\n")
+    write_atomically(path, (json.dumps(header, indent=2) + "\n").encode())
 
 
 def read_header(folder: Path) -> dict[str, Any]:

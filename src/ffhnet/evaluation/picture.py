@@ -13,6 +13,7 @@ from PIL import Image, ImageDraw, ImageFont
 from ffhnet.errors import HandError, OptionError
 from ffhnet.evaluation.render import Surface, camera_around, render, square_camera
 from ffhnet.evaluation.shapes import (
+    PALM,
     approach_arrows,
     cloud_surface,
     color_scale,
@@ -39,7 +40,7 @@ _FAINT = (96, 106, 120)
 _OBSERVER = 180.0
 """Degrees: the observer stands at -x of the view frame."""
 
-_SIDES = (-65.0, -35.0, 35.0, 65.0)
+_SIDES = (-85.0, -55.0, -25.0, 25.0, 55.0, 85.0)
 """Degrees from the observer's side from which a grasp may be shown: the observed surface stays in sight."""
 
 _ELEVATION = 24.0
@@ -116,10 +117,10 @@ def grasp_picture(
     ground = observation.table_height
 
     shown = distinct(ranked, 3)
-    side = _clearest_side(cloud, ranked, shown[0], hand)
-    best = _grasp_panel(cloud, ranked, shown[0], hand, side, "best grasp")
-    others = [_grasp_panel(cloud, ranked, i, hand, None, f"rank {i + 1}") for i in shown[1:]]
-    others.append(_grasp_panel(cloud, ranked, shown[0], hand, -side, "best grasp, other side"))
+    best = _grasp_panel(cloud, ranked, shown[0], hand, _SIDES, "best grasp")
+    others = [_grasp_panel(cloud, ranked, i, hand, _SIDES, f"rank {i + 1}") for i in shown[1:]]
+    across = tuple(side for side in _SIDES if side * (best.azimuth - _OBSERVER) < 0)
+    others.append(_grasp_panel(cloud, ranked, shown[0], hand, across, "best grasp, other side"))
     palms = _palms_panel(cloud, ranked)
 
     width = _BIG + 2 * _SMALL + 4 * _GAP
@@ -150,48 +151,49 @@ def save_png(picture: Image.Image, path: str | Path) -> None:
     write_atomically(path, buffer.getvalue())
 
 
-def _clearest_side(cloud: _Cloud, grasps: Grasps, index: int, hand: Hand) -> float:
-    """The one of `_SIDES` from which the hand hides the fewest observed points."""
-    mesh = hand.shape(grasps.joints[index])
-    mesh.apply_transform(make_transform(grasps.rotation[index], grasps.position[index]))
-    scene = RayScene([mesh])
-    elevation = np.radians(_ELEVATION)
-
-    def hidden(side: float) -> int:
-        azimuth = np.radians(_OBSERVER + side)
-        flat = np.cos(elevation)
-        back = np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])
-        return int(scene.occluded(cloud.points, np.broadcast_to(back, cloud.points.shape)).sum())
-
-    return min(_SIDES, key=hidden)
-
-
 def _grasp_panel(
-    cloud: _Cloud, grasps: Grasps, index: int, hand: Hand, side: float | None, name: str
+    cloud: _Cloud, grasps: Grasps, index: int, hand: Hand, sides: tuple[float, ...], name: str
 ) -> _Panel:
-    """A grasp on the cloud, seen from `side` degrees off the observer, or from the clearest side."""
+    """A grasp on the cloud, from the clearest of `sides` (degrees from the observer)."""
     T_view_palm = make_transform(grasps.rotation[index], grasps.position[index])
-    parts = [
-        *hand_surfaces(hand, grasps.joints[index], T_view_palm),
-        *frame_surfaces(T_view_palm, length=0.12, radius=0.0022),
-    ]
+    parts = hand_surfaces(hand, grasps.joints[index], T_view_palm)
+    axes = frame_surfaces(T_view_palm, length=0.12, radius=0.0022)
+    points = np.concatenate([cloud.points, *(surface.mesh.vertices for surface in (*parts, *axes))])
     assert grasps.probability is not None
     return _Panel(
-        surfaces=[cloud.surface, *parts],
-        points=np.concatenate([cloud.points, *(part.mesh.vertices for part in parts)]),
-        azimuth=_OBSERVER + (_clearest_side(cloud, grasps, index, hand) if side is None else side),
+        surfaces=[cloud.surface, *parts, *axes],
+        points=points,
+        azimuth=_OBSERVER + _clearest_side(cloud, parts, points, sides),
         caption=f"{name}   p = {grasps.probability[index]:.2f}",
     )
 
 
+def _clearest_side(
+    cloud: _Cloud, parts: list[Surface], points: Float[np.ndarray, "N 3"], sides: tuple[float, ...]
+) -> float:
+    """The side from which much of the observed points and much of the fingers is seen."""
+    scene = RayScene([cloud.surface.mesh, *(part.mesh for part in parts)])
+    fingers = [1 + i for i, part in enumerate(parts) if part.color is not PALM]
+    camera = square_camera(64)
+    x, y = np.meshgrid(*camera.rays())
+    directions = np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3)
+
+    def seen(side: float) -> int:
+        T_view_camera = camera_around(points, _OBSERVER + side, _ELEVATION, camera)
+        hits = scene.cast(T_view_camera[None, :3, 3], directions @ T_view_camera[:3, :3].T)
+        return int((1 + (hits.mesh == 0).sum()) * (1 + np.isin(hits.mesh, fingers).sum()))
+
+    return max(sides, key=seen)
+
+
 def _palms_panel(cloud: _Cloud, grasps: Grasps) -> _Panel:
-    """All palms as arrows along their approach axes, the best drawn last in the brightest colour."""
+    """All palms as arrows along their approach axes, coloured by probability."""
     assert grasps.probability is not None
     arrows = approach_arrows(grasps.rotation, grasps.position, color_scale(grasps.probability))
     return _Panel(
         surfaces=[cloud.surface, arrows],
         points=np.concatenate([cloud.points, arrows.mesh.vertices]),
-        azimuth=_OBSERVER + _SIDES[1],
+        azimuth=_OBSERVER - 40.0,
         caption=f"all {len(grasps)} palms",
         margin=1.32,
     )

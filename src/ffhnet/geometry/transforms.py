@@ -9,7 +9,11 @@ def make_transform(
     position: Float[np.ndarray, "*batch 3"] | None = None,
 ) -> Float[np.ndarray, "*batch 4 4"]:
     """Transform from a rotation (identity if none) and a position in metres (zero if none)."""
-    batch = np.shape(rotation)[:-2] if rotation is not None else np.shape(position)[:-1]
+    batch: tuple[int, ...] = ()
+    if rotation is not None:
+        batch = rotation.shape[:-2]
+    elif position is not None:
+        batch = position.shape[:-1]
     transform = np.broadcast_to(np.eye(4), (*batch, 4, 4)).copy()
     if rotation is not None:
         transform[..., :3, :3] = rotation

@@ -104,7 +104,7 @@ class Hand:
         return torch.stack(tips, dim=1)
 
     def root_pose(
-        self, rotation: Float[np.ndarray, "3 3"], position: Float[np.ndarray, "3"]
+        self, rotation: Float[np.ndarray, "3 3"], position: Float[np.ndarray, " 3"]
     ) -> Float[np.ndarray, "4 4"]:
         """T_frame_root of the hand whose palm stands at the given pose in some frame."""
         return make_transform(rotation, position) @ invert(self.T_root_palm)

@@ -37,7 +37,7 @@ class Joint:
     """A hinge: its unit axis in the body's frame and its limits in radians."""
 
     name: str
-    axis: Float[np.ndarray, "3"]
+    axis: Float[np.ndarray, " 3"]
     lower: float
     upper: float
 
@@ -58,7 +58,7 @@ class Site:
 
     name: str
     body: int
-    position: Float[np.ndarray, "3"]
+    position: Float[np.ndarray, " 3"]
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class KinematicTree:
         return torch.stack(poses, dim=1)
 
 
-def _hinge(axis: Float[np.ndarray, "3"], angle: Float[Tensor, " B"]) -> Float[Tensor, "B 4 4"]:
+def _hinge(axis: Float[np.ndarray, " 3"], angle: Float[Tensor, " B"]) -> Float[Tensor, "B 4 4"]:
     """Rotation about a unit axis (Rodrigues) as a batch of transforms."""
     x, y, z = axis
     cross = torch.tensor([[0, -z, y], [z, 0, -x], [-y, x, 0]], dtype=angle.dtype, device=angle.device)
@@ -224,7 +224,7 @@ def _pose(attributes: dict[str, str], name: str) -> Float[np.ndarray, "4 4"]:
     return make_transform(matrix_from_quaternion(quaternion), position)
 
 
-def _rotation_z_to(direction: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+def _rotation_z_to(direction: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:
     """A rotation that takes z to the given direction."""
     z = direction / np.linalg.norm(direction)
     helper = np.eye(3)[np.argmin(np.abs(z))]

@@ -121,6 +121,11 @@ def load_checkpoint(folder: Path, hand: str | None = None, device: torch.device 
     return Checkpoint(info, generator, evaluator)
 
 
+def read_info(folder: Path) -> CheckpointInfo:
+    """Description of the weights in a folder, whichever of the networks are there. Raises WeightsError."""
+    return _read_config(folder)[0]
+
+
 def _storable(network: nn.Module, half: bool) -> dict[str, torch.Tensor]:
     """Weights on the CPU; vectors stay 32-bit, since a running variance can be too small for 16 bits."""
     return {

@@ -13,7 +13,6 @@ from ffhnet.geometry.transforms import make_transform
 from ffhnet.grasps import Grasps
 from ffhnet.simulation.scene import HAND, OBJECT, TABLE, Scene
 
-
 SETTLE_PERIODS = 6
 SETTLE_MOTION = 0.004
 """rad: closing ends early when no joint has moved further during SETTLE_PERIODS control periods."""
@@ -82,11 +81,15 @@ class _Row:
 
 
 class GraspTrial:
-    """Executes grasps on one object; build once per object, run as many grasps as wanted."""
+    """Executes grasps on one object; build once per object, run as many grasps as wanted.
+
+    Attributes:
+        hand: the hand of the scene.
+    """
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._hand = scene.hand
+        self.hand = scene.hand
         self._physics = scene.physics
         self._steps = round(scene.physics.control_period / scene.physics.timestep)
 
@@ -95,7 +98,7 @@ class GraspTrial:
         rows = [self._run_one(grasps, i, T_world_object) for i in range(len(grasps))]
         return TrialResults(
             outcome=np.array([row.outcome for row in rows], dtype=np.int8),
-            closed_joints=np.array([row.closed_joints for row in rows]).reshape(-1, self._hand.num_joints),
+            closed_joints=np.array([row.closed_joints for row in rows]).reshape(-1, self.hand.num_joints),
             contact_links=np.array([row.contact_links for row in rows], dtype=np.int8),
             pushed=np.array([row.pushed for row in rows]),
             rise=np.array([row.rise for row in rows]),
@@ -112,8 +115,8 @@ class GraspTrial:
         self._scene.place_object(T_world_object)
 
     def _can_reach(self, grasps: Grasps, i: int) -> bool:
-        T_world_root = self._hand.root_pose(grasps.rotation[i], grasps.position[i])
-        approach_axis, opened = grasps.rotation[i][:, 0], self._hand.open(grasps.joints[i])
+        T_world_root = self.hand.root_pose(grasps.rotation[i], grasps.position[i])
+        approach_axis, opened = grasps.rotation[i][:, 0], self.hand.open(grasps.joints[i])
         # The grasp pose first: it is where most collisions are found.
         for back in np.linspace(0, self._physics.approach_distance, self._physics.approach_steps):
             retreat = make_transform(position=-back * approach_axis)
@@ -136,7 +139,7 @@ class GraspTrial:
             return _Row(Outcome.COLLISION, joints)
         self._reset(T_world_object)
         self._scene.place_hand(
-            self._hand.root_pose(grasps.rotation[i], grasps.position[i]), self._hand.open(joints)
+            self.hand.root_pose(grasps.rotation[i], grasps.position[i]), self.hand.open(joints)
         )
         mujoco.mj_forward(self._scene.model, self._scene.data)
         row = self._execute(joints)
@@ -187,12 +190,12 @@ class GraspTrial:
         On the way to the grasp's joints all fingers arrive together; from there on they close at one
         speed. No target runs more than `lead` ahead of its joint.
         """
-        closing, scene = self._hand.closing, self._scene
+        closing, scene = self.hand.closing, self._scene
         step = closing.speed * self._physics.control_period
-        target = self._hand.open(joints)
+        target = self.hand.open(joints)
         way = joints - target
         arriving = max(round(way.max() / step), 1)
-        settled = self._hand.open(joints)
+        settled = self.hand.open(joints)
         for k in range(round(closing.duration / self._physics.control_period)):
             measured = scene.data.qpos[scene.joint_qpos]
             if k > arriving and k % SETTLE_PERIODS == 0:
@@ -201,7 +204,7 @@ class GraspTrial:
                     break
                 settled = measured.copy()
             advanced = target + (way / arriving if k < arriving else step * closing.moves)
-            limit = np.minimum(measured + closing.lead, self._hand.upper)
+            limit = np.minimum(measured + closing.lead, self.hand.upper)
             target = np.where(closing.moves > 0, np.maximum(target, np.minimum(advanced, limit)), target)
             scene.data.ctrl[scene.actuators] = target
             self._advance()
@@ -211,7 +214,7 @@ class GraspTrial:
     def _advance(self) -> None:
         mujoco.mj_step(self._scene.model, self._scene.data, self._steps)
 
-    def _object_position(self) -> Float[np.ndarray, "3"]:
+    def _object_position(self) -> Float[np.ndarray, 3]:
         """Centre of mass of the object, world frame."""
         return self._scene.data.xipos[self._scene.object_body].copy()
 

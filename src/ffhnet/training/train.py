@@ -53,7 +53,7 @@ def train_generator(
     module = _initial(FFHGenerator, data, config, start).to(device)
     metrics = fit(GeneratorTask(module, config, data, val), config, out_dir, "generator", progress)
     info = _info(data, config, joint_limits, "generator", metrics)
-    save_checkpoint(out_dir, info, generator=module)
+    save_checkpoint(out_dir, info, generator=module, half=True)
     return module
 
 
@@ -72,7 +72,7 @@ def train_evaluator(
     module = _initial(FFHEvaluator, data, config, start).to(device)
     metrics = fit(EvaluatorTask(module, config, data, val), config, out_dir, "evaluator", progress)
     info = _info(data, config, joint_limits, "evaluator", metrics)
-    save_checkpoint(out_dir, info, evaluator=module)
+    save_checkpoint(out_dir, info, evaluator=module, half=True)
     return module
 
 

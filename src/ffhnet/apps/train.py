@@ -1,0 +1,78 @@
+"""`ffhnet train`: both networks from data sets."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from ffhnet.apps.console import absent, print_table
+from ffhnet.apps.extras import require_sim
+from ffhnet.errors import OptionError
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """Train the generator and the evaluator; a run that was stopped goes on from its last state."""
+
+    data: Annotated[tuple[Path, ...], tyro.conf.Positional]
+    """Data sets, as made by `ffhnet generate`."""
+    out: Path
+    """Folder of the weights."""
+    val: Annotated[Path | None, absent("DIR")] = None
+    """Data set of held-out objects to measure on."""
+    preset: Literal["default", "paper"] = "default"
+    """The project's own architecture and recipe, or the paper's (section III-D; hours on a CPU)."""
+    networks: Literal["both", "generator", "evaluator"] = "both"
+    """Which of them to train."""
+    start: Annotated[Path | None, absent("DIR")] = None
+    """Weights to go on from."""
+    steps: Annotated[int | None, absent("N", "the preset's")] = None
+    """Optimiser steps of each network."""
+    seed: int = 0
+    """Seed of initial weights, batches and noise."""
+    threads: int = field(default_factory=lambda: os.cpu_count() or 1)
+    """Processor threads."""
+
+
+def run(options: TrainOptions) -> None:
+    """Train, then print the held-out metrics."""
+    require_sim("train")
+    import dataclasses
+
+    import torch
+
+    from ffhnet.dataset.records import read_training_data
+    from ffhnet.hands import load_hand
+    from ffhnet.model.checkpoint import load_checkpoint, read_info
+    from ffhnet.training.config import TrainingConfig
+    from ffhnet.training.train import train_evaluator, train_generator
+
+    if options.threads < 1 or (options.steps is not None and options.steps < 1):
+        raise OptionError("--threads and --steps must be at least 1")
+    torch.set_num_threads(options.threads)
+    data = read_training_data(list(options.data))
+    val = None if options.val is None else read_training_data([options.val])
+    start = None if options.start is None else load_checkpoint(options.start, hand=data.hand)
+    config = TrainingConfig.paper() if options.preset == "paper" else TrainingConfig.default()
+    config = dataclasses.replace(config, steps=options.steps or config.steps, seed=options.seed)
+    hand = load_hand(data.hand)
+    limits = (hand.lower.tolist(), hand.upper.tolist())
+    print(f"{len(data.object_names)} objects, {data.num_views} views, {data.num_trials} trials")
+    if options.networks != "evaluator":
+        begin = None if start is None else start.generator
+        train_generator(data, val, config, options.out, limits, start=begin)
+    if options.networks != "generator":
+        judge = None if start is None else start.evaluator
+        train_evaluator(data, val, config, options.out, limits, start=judge)
+    if val is not None:
+        summary = read_info(options.out).training
+        rows = [
+            (network, name, f"{value:.4f}")
+            for network, run_summary in summary.items()
+            for name, value in run_summary["held_out"].items()
+        ]
+        print_table(f"on {len(val.object_names)} held-out objects", ("network", "measure", "value"), rows)

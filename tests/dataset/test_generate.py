@@ -1,0 +1,152 @@
+"""The generation job on two small objects: what is written, determinism, resumption after a kill."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from ffhnet.dataset.generate import GenerateConfig, generate
+from ffhnet.dataset.records import pack, read_header, read_tables, read_training_data
+from ffhnet.dataset.statistics import summarise
+from ffhnet.errors import DatasetError
+from ffhnet.objects.procedural import make_object, object_name, procedural_split
+from ffhnet.simulation.scene import build_scene
+from ffhnet.simulation.trial import GraspTrial
+
+SEEDS = procedural_split("test", 3)
+SMALL = GenerateConfig(
+    placements=1, views=2, heuristic=4, power=4, perturb_rounds=1, perturb=6, max_collisions=3
+)
+
+
+def run(out, workers=1, seeds=SEEDS[:2]):
+    done = []
+    generate(seeds, out, SMALL, workers, done.append)
+    return done
+
+
+@pytest.fixture(scope="module")
+def data_set(tmp_path_factory):
+    out = tmp_path_factory.mktemp("data") / "set"
+    run(out)
+    return out
+
+
+def contents(folder):
+    return {
+        path.relative_to(folder): path.read_bytes()
+        for path in folder.rglob("*.parquet")
+        if not path.name.startswith(".")
+    }
+
+
+def test_what_is_written(data_set):
+    trials, views = read_tables(data_set, "trials"), read_tables(data_set, "views")
+    assert set(trials["object"].to_pylist()) == {object_name(seed) for seed in SEEDS[:2]}
+    assert len(views) == 4
+    proposer, outcome = np.array(trials["proposer"].to_pylist()), np.array(trials["outcome"].to_pylist())
+    for name in ("heuristic", "power"):
+        executed = (proposer == name) & (outcome != "collision")
+        assert 0 < executed.sum() <= 8
+    rise = trials["rise"].to_numpy()
+    assert (rise[outcome == "success"] >= 0.15).all()
+    assert (rise[outcome == "collision"] == 0).all()
+    assert read_header(data_set)["hand"] == "dlr_hit_ii"
+
+
+def test_same_seed_same_bytes_for_any_number_of_workers(data_set, tmp_path):
+    run(tmp_path / "again", workers=2)
+    assert contents(tmp_path / "again") == contents(data_set)
+
+
+def test_finished_objects_are_left_alone(data_set):
+    before = {path: path.stat().st_mtime_ns for path in data_set.rglob("*.parquet")}
+    assert run(data_set) == []
+    assert before == {path: path.stat().st_mtime_ns for path in data_set.rglob("*.parquet")}
+
+
+def test_other_settings_are_refused(data_set):
+    with pytest.raises(DatasetError, match="other settings"):
+        generate(SEEDS[:1], data_set, GenerateConfig(), 1, print)
+
+
+def test_stored_labels_come_again_from_physics(data_set):
+    """Grasps read back from the file earn the labels that stand beside them."""
+    data = read_training_data([data_set])
+    obj = make_object(SEEDS[0])
+    number = data.object_names.index(obj.name)
+    mine = np.flatnonzero(data.placement_object[data.trial_placement] == number)
+    from ffhnet.grasps import Grasps
+
+    grasps = Grasps(
+        rotation=data.rotation[mine],
+        position=data.position[mine],
+        joints=data.joints[mine],
+        joint_names=data.joint_names,
+        hand=data.hand,
+        frame="world",
+    )
+    from ffhnet.hands import load_hand
+
+    results = GraspTrial(build_scene(load_hand(), obj)).run(grasps, obj.resting_poses[0])
+    # Stored in 16 and 32 bits: a grasp on the edge may fall to the other side.
+    assert (results.success != (data.label[mine] > 0)).sum() <= 1
+    assert (results.executed != data.executed[mine]).sum() <= 1
+
+
+def test_views_and_grasps_share_the_world_frame(data_set):
+    """Successful palms are within a hand's length of the centre of what the camera saw."""
+    data = read_training_data([data_set])
+    centre = data.T_world_view[:, :3, 3]
+    for placement in range(data.num_placements):
+        seen = centre[data.view_placement == placement].mean(axis=0)
+        held = (data.trial_placement == placement) & data.success
+        distance = np.linalg.norm(data.position[held] - seen, axis=1)
+        assert (distance < 0.25).all()
+    assert (data.table_height < 0).all()
+
+
+def test_pack_keeps_everything(data_set, tmp_path):
+    pack(data_set, tmp_path / "packed")
+    packed, loose = read_training_data([tmp_path / "packed"]), read_training_data([data_set])
+    np.testing.assert_array_equal(packed.position, loose.position)
+    np.testing.assert_array_equal(packed.bps, loose.bps)
+    assert summarise(tmp_path / "packed").rows == summarise(data_set).rows
+
+
+def test_a_killed_job_goes_on_and_ends_with_the_same_files(data_set, tmp_path):
+    out = tmp_path / "killed"
+    script = (
+        "from pathlib import Path\n"
+        "from ffhnet.dataset.generate import GenerateConfig, generate\n"
+        "if __name__ == '__main__':\n"
+        f"    generate({SEEDS[:2]!r}, Path({str(out)!r}), {SMALL!r}, 1, print)\n"
+    )
+    program = tmp_path / "job.py"
+    program.write_text("from ffhnet.simulation.physics import Physics\n" + script, encoding="utf-8")
+    job = subprocess.Popen([sys.executable, str(program)], start_new_session=True)
+    deadline = time.monotonic() + 120
+    while not list(out.glob("trials/[!.]*.parquet")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.killpg(job.pid, signal.SIGKILL)
+    job.wait()
+    assert len(contents(out)) < 4
+    run(out)
+    assert contents(out) == contents(data_set)
+
+
+def test_damaged_data_sets_are_named(tmp_path):
+    with pytest.raises(DatasetError, match=r"dataset\.json"):
+        read_training_data([tmp_path])
+    (tmp_path / "dataset.json").write_text(json.dumps({"format": 1, "hand": "x", "joint_names": []}))
+    with pytest.raises(DatasetError, match="holds no trials"):
+        read_training_data([tmp_path])
+    (tmp_path / "trials").mkdir()
+    (tmp_path / "trials" / "a.parquet").write_bytes(b"PAR1 but no more")
+    with pytest.raises(DatasetError, match="damaged"):
+        read_training_data([tmp_path])
