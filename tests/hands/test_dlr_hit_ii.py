@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 import torch
+
 from ffhnet.errors import HandError
 from ffhnet.geometry.transforms import apply, invert
 from ffhnet.hands import load_hand

@@ -143,3 +143,17 @@ def test_real_captures_are_read(captures):
     depth = read_depth(captures / "kinect_osd" / "learn0" / "depth.png", 0.0001)
     assert depth.shape == (480, 640)
     assert 0.3 < np.median(depth[depth > 0]) < 3
+
+
+def test_files_cut_between_two_points_are_refused(tmp_path):
+    binary = write_cloud(tmp_path / "a.pcd").read_bytes()
+    row = len(POINTS[0].tobytes())
+    (tmp_path / "a.pcd").write_bytes(binary[: -50 * row])
+    with pytest.raises(InputFileError, match=r"200|damaged"):
+        read_cloud(tmp_path / "a.pcd")
+    lines = ["ply", "format ascii 1.0", "element vertex 200"]
+    lines += [f"property float {axis}" for axis in "xyz"] + ["end_header"]
+    lines += [" ".join(map(str, point)) for point in POINTS[:150]]
+    (tmp_path / "b.ply").write_text("\n".join(lines) + "\n")
+    with pytest.raises(InputFileError, match=r"200|damaged"):
+        read_cloud(tmp_path / "b.ply")

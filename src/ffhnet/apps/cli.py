@@ -17,7 +17,7 @@ from typing import Annotated, Any, Union, cast
 
 import tyro
 
-from ffhnet.apps import evaluate, generate, grasp, hand, objects, train
+from ffhnet.apps import data, evaluate, generate, grasp, hand, objects, train
 from ffhnet.errors import FFHNetError
 
 
@@ -35,6 +35,7 @@ COMMANDS = (
     Command("objects", objects.ObjectsOptions, objects.run),
     Command("hand", hand.HandOptions, hand.run),
     Command("generate", generate.GenerateOptions, generate.run),
+    Command("data", data.DataOptions, data.run),
     Command("train", train.TrainOptions, train.run),
     Command("evaluate", evaluate.EvaluateOptions, evaluate.run),
 )

@@ -115,7 +115,7 @@ def _rate(cell: Cell) -> str:
 
 
 def _with_interval(cell: Cell) -> str:
-    from ffhnet.evaluation.metrics import wilson_interval
+    from ffhnet.metrics import wilson_interval
 
     interval = wilson_interval(cell.successes, cell.kept)
     rate = "-" if cell.kept == 0 else f"{cell.rate:.1%}"

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ffhnet.dataset.records import read_tables
+from ffhnet.metrics import wilson_interval
 from ffhnet.simulation.trial import Outcome
 
 OUTCOMES = tuple(outcome.name.lower() for outcome in Outcome)
@@ -23,7 +24,9 @@ class Summary:
 
 
 def summarise(folder: Path) -> Summary:
-    """Trials by proposer and outcome; "success" is the share of executed trials, collisions left out.
+    """Trials by proposer and outcome; "success" is the share of executed trials, with its 95 % interval.
+
+    Start collisions are left out of that share: of the samplers' only some are kept, as negatives.
 
     Raises:
         DatasetError: the folder is no data set.
@@ -45,4 +48,6 @@ def _row(name: str, outcome: np.ndarray) -> tuple[str, ...]:
     counts = [int((outcome == kind).sum()) for kind in OUTCOMES]
     executed = len(outcome) - counts[Outcome.COLLISION]
     rate = counts[Outcome.SUCCESS] / executed if executed else float("nan")
-    return (name, str(executed), f"{rate:.1%}", *(str(count) for count in counts))
+    interval = wilson_interval(counts[Outcome.SUCCESS], executed)
+    success = f"{rate:.1%} ({interval.low:.1%} to {interval.high:.1%})"
+    return (name, str(executed), success, *(str(count) for count in counts))

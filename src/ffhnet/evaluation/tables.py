@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ffhnet.evaluation.metrics import auroc, expected_calibration_error, wilson_interval
 from ffhnet.evaluation.protocol import ViewOutcome
+from ffhnet.metrics import auroc, expected_calibration_error, wilson_interval
 
 THRESHOLDS = (0.0, 0.5, 0.7, 0.9, 0.95)
 """Columns of Table I."""

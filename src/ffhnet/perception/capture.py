@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import trimesh
@@ -124,8 +125,27 @@ def _read_ply(path: Path) -> np.ndarray:
     with path.open("rb") as file:
         if file.read(3) != b"ply":
             raise InputFileError(f"{path}: not a PLY file: it does not begin with 'ply'")
+        promised = _promised_vertices(file)
     loaded = trimesh.load(path, file_type="ply", process=False)
-    return np.asarray(loaded.vertices)
+    return _complete(path, np.asarray(loaded.vertices), promised)
+
+
+def _promised_vertices(file: BinaryIO) -> int:
+    """Number of vertices that a PLY header announces."""
+    for line in file:
+        words = line.split()
+        if words[:2] == [b"element", b"vertex"]:
+            return int(words[2])
+        if words[:1] == [b"end_header"]:
+            break
+    return 0
+
+
+def _complete(path: Path, points: np.ndarray, promised: int) -> np.ndarray:
+    """The points, if there are as many as the header promised: a file cut between two points is still cut."""
+    if len(points) != promised:
+        raise InputFileError(f"{path}: truncated: the header promises {promised} points, got {len(points)}")
+    return points
 
 
 def _read_pcd(path: Path) -> np.ndarray:
@@ -135,7 +155,7 @@ def _read_pcd(path: Path) -> np.ndarray:
         raise InputFileError(
             f"{path}: a cloud must have the fields x, y and z, got {', '.join(cloud.fields)}"
         )
-    return cloud.numpy(("x", "y", "z"))
+    return _complete(path, cloud.numpy(("x", "y", "z")), cloud.metadata.points)
 
 
 def _read_png(path: Path) -> np.ndarray:

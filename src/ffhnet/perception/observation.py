@@ -23,7 +23,10 @@ _AHEAD = 0.95
 """Least share of a scene's points that must lie in front of the camera."""
 
 _LOWEST_PERCENT = 0.5
-"""Percentile of the heights that is taken for the table where no plane is known: stray points lie lower."""
+"""Percentile of the heights that counts as the object's lowest point: stray points lie lower."""
+
+_CUT_BOTTOM = 0.008
+"""m that removing the table takes off an object's bottom, so that the table lies below its lowest point."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +90,8 @@ def observe_object(
         viewing_direction = _guess_viewing_direction(cloud, frame)
     T_input_view = view_frame(cloud, up, viewing_direction)
     if table_height is None:
-        table_height = float(np.percentile((cloud - cloud.mean(axis=0)) @ up, _LOWEST_PERCENT))
+        lowest = float(np.percentile((cloud - cloud.mean(axis=0)) @ up, _LOWEST_PERCENT))
+        table_height = lowest - _CUT_BOTTOM
     if not table_height < 0:
         raise OptionError(f"the table must be below the cloud's mean (negative metres), got {table_height}")
     return _observation(cloud, frame, T_input_view, table_height, None)

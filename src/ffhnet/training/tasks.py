@@ -9,8 +9,8 @@ import torch
 from torch import Tensor, nn
 
 from ffhnet.dataset.training_data import TrainingData
-from ffhnet.evaluation.metrics import auroc, binary_cross_entropy, expected_calibration_error
 from ffhnet.geometry.rotations import geodesic_angle
+from ffhnet.metrics import auroc, binary_cross_entropy, expected_calibration_error
 from ffhnet.model.evaluator import FFHEvaluator
 from ffhnet.model.generator import FFHGenerator
 from ffhnet.model.losses import evaluator_loss, generator_loss, kl_divergence

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ffhnet.errors import OptionError
-from ffhnet.evaluation.metrics import auroc, binary_cross_entropy, expected_calibration_error, wilson_interval
+from ffhnet.metrics import auroc, binary_cross_entropy, expected_calibration_error, wilson_interval
 
 pairs = st.lists(st.tuples(st.booleans(), st.integers(0, 5)), min_size=2, max_size=40)
 
