@@ -32,6 +32,7 @@ def data() -> TrainingData:
         rotation=np.eye(3) * trial_object[:, None, None],
         position=np.repeat(trial_object[:, None], 3, axis=1).astype(float),
         joints=np.repeat(trial_object[:, None], 2, axis=1).astype(float),
+        closed_joints=np.repeat(trial_object[:, None], 2, axis=1).astype(float),
         label=np.where(np.arange(30) % 2, 1.0, 0.0),
         executed=np.arange(30) % 2 == 1,
         proposer=trial_object,

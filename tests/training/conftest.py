@@ -55,6 +55,7 @@ def point_world(seed: int, objects: int = 60, views: int = 3, trials: int = 60) 
         rotation=np.stack([about_z(a) for a in rng.uniform(-np.pi, np.pi, len(position))]),
         position=position,
         joints=joints,
+        closed_joints=joints,
         label=(near & executed).astype(float),
         executed=executed,
         proposer=np.zeros(len(position), dtype=int),

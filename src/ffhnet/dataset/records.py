@@ -191,6 +191,7 @@ def read_training_data(folders: list[Path]) -> TrainingData:
         rotation=matrix_from_quaternion(_array(trials["quaternion_wxyz"])),
         position=_array(trials["position"]).astype(float),
         joints=_array(trials["joints"]).astype(float),
+        closed_joints=_array(trials["closed_joints"]).astype(float),
         label=(outcome == "success").astype(float),
         executed=outcome != "collision",
         proposer=np.array([PROPOSERS.index(p) for p in trials["proposer"].to_pylist()]),

@@ -31,7 +31,8 @@ class TrainingData:
         trial_placement: placement of each trial.
         rotation: palm axes as columns, world frame.
         position: palm origin in metres, world frame.
-        joints: joint angles before closing, radians.
+        joints: joint angles to which the open hand was closed, radians.
+        closed_joints: joint angles that it reached, against object or limit, radians.
         label: success in [0, 1]; a fraction where a trial was repeated under varied physics.
         executed: False where the hand collided at the start, so that nothing was executed (label 0).
         proposer: code of what proposed the grasp.
@@ -49,6 +50,7 @@ class TrainingData:
     rotation: Float[np.ndarray, "T 3 3"]
     position: Float[np.ndarray, "T 3"]
     joints: Float[np.ndarray, "T J"]
+    closed_joints: Float[np.ndarray, "T J"]
     label: Float[np.ndarray, " T"]
     executed: Bool[np.ndarray, " T"]
     proposer: Int[np.ndarray, " T"]
@@ -62,6 +64,7 @@ class TrainingData:
             "rotation": (trials, 3, 3),
             "position": (trials, 3),
             "joints": (trials, len(self.joint_names)),
+            "closed_joints": (trials, len(self.joint_names)),
             "label": (trials,),
             "executed": (trials,),
             "proposer": (trials,),
@@ -127,6 +130,7 @@ class TrainingData:
             rotation=self.rotation[trials],
             position=self.position[trials],
             joints=self.joints[trials],
+            closed_joints=self.closed_joints[trials],
             label=self.label[trials],
             executed=self.executed[trials],
             proposer=self.proposer[trials],

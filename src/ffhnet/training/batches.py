@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
+from ffhnet.dataset.robustness import local_success
 from ffhnet.dataset.training_data import TrainingData
 from ffhnet.errors import DatasetError
 from ffhnet.geometry.rotations import matrix_from_euler_xyz
@@ -77,9 +79,21 @@ class BatchMaker:
             raise DatasetError("no view shows a placement with grasps to train on")
 
     @classmethod
-    def for_generator(cls, data: TrainingData) -> BatchMaker:
-        """Successful grasps only."""
-        return cls(data, (SUCCESS,), (1.0,))
+    def for_generator(cls, data: TrainingData, min_local_success: float = 0.0) -> BatchMaker:
+        """Successful grasps only, with the joint angles in which the hand held the object.
+
+        The angles that were asked for are mostly chance; those that were reached follow from object and
+        palm pose, and closing towards them ends in the same grasp.
+
+        Args:
+            data: views and trials.
+            min_local_success: successes whose neighbours succeed less often are left out.
+        """
+        good = data.success
+        if min_local_success > 0:
+            good = good & (local_success(data) >= min_local_success)
+        held = dataclasses.replace(data, joints=data.closed_joints, label=np.where(good, data.label, 0.0))
+        return cls(held, (SUCCESS,), (1.0,))
 
     @classmethod
     def for_evaluator(cls, data: TrainingData, shares: ClassShares | None) -> BatchMaker:

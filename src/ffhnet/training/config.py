@@ -51,6 +51,7 @@ class TrainingConfig:
         kl_weight: final weight of the KL term (generator).
         kl_start: share of the run during which that weight is zero.
         kl_full: share of the run after which it is reached, linearly from `kl_start`.
+        min_local_success: the generator leaves out successes among whose neighbours fewer succeed.
         shares: make-up of the evaluator's batches, or None to draw trials as they are in the data.
         seed: of the initial weights, batches and noise.
         metrics_every: steps between measurements on held-out data.
@@ -68,6 +69,7 @@ class TrainingConfig:
     kl_weight: float = KL_WEIGHT
     kl_start: float = 0.0
     kl_full: float = 0.07
+    min_local_success: float = 0.4
     shares: ClassShares | None = field(default_factory=ClassShares)
     seed: int = 0
     metrics_every: int = 200
@@ -104,6 +106,7 @@ class TrainingConfig:
             weight_decay=0.0,
             kl_start=2 / 30,
             kl_full=2 / 30,
+            min_local_success=0.0,
             shares=ClassShares(success=0.3, failure=0.3, collision=0.0, hard_negative=0.4),
         )
 

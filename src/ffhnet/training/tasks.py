@@ -47,7 +47,7 @@ class GeneratorTask:
         self.module = module
         self.config = config
         self._device = next(module.parameters()).device
-        self._batches = BatchMaker.for_generator(data)
+        self._batches = BatchMaker.for_generator(data, config.min_local_success)
         self._held_out = None
         if held_out is not None:
             self._held_out = _held_out_batch(BatchMaker.for_generator(held_out), self._device)
