@@ -2,8 +2,8 @@
 
 Run it from the repository root: python docs/make_capture_pictures.py PATH_TO_CAPTURES
 
-The captures are not part of the repository (licences). PATH_TO_CAPTURES holds `d415_objects` (object clouds in
-camera axes with `T_cloud_mesh`, whose third column is the up direction) and depth scenes with `meta.json`.
+The captures are not part of the repository (licences). PATH_TO_CAPTURES holds `d415_objects` (object clouds
+in camera axes with `T_cloud_mesh`, whose third column is up) and depth scenes with `meta.json`.
 """
 
 import json
@@ -32,6 +32,8 @@ SCENES = (
 
 @dataclass(frozen=True)
 class Options:
+    """What the pictures are made from."""
+
     captures: tyro.conf.Positional[Path]
     """Folder with the captures."""
 
@@ -52,6 +54,7 @@ def observe_table_scene(folder: Path) -> Observation:
 
 
 def main(options: Options) -> None:
+    """Observe, grasp and draw each capture."""
     network, hand = FFHNet.from_pretrained(), load_hand()
     IMAGES.mkdir(parents=True, exist_ok=True)
     views = {name: observe_cut_out(options.captures / "d415_objects" / name) for name in OBJECTS}

@@ -22,6 +22,7 @@ def data() -> TrainingData:
     return TrainingData(
         hand="hand",
         joint_names=("a", "b"),
+        closes=np.ones(1, bool),
         object_names=NAMES,
         placement_object=placement_object,
         view_placement=view_placement,
@@ -33,6 +34,7 @@ def data() -> TrainingData:
         position=np.repeat(trial_object[:, None], 3, axis=1).astype(float),
         joints=np.repeat(trial_object[:, None], 2, axis=1).astype(float),
         closed_joints=np.repeat(trial_object[:, None], 2, axis=1).astype(float),
+        margin=np.ones(len(trial_object)),
         label=np.where(np.arange(30) % 2, 1.0, 0.0),
         executed=np.arange(30) % 2 == 1,
         proposer=trial_object,
@@ -79,3 +81,47 @@ def test_unknown_object(data: TrainingData):
 def test_inconsistent_arrays_are_refused(data: TrainingData, change: dict, message: str):
     with pytest.raises(DatasetError, match=message):
         dataclasses.replace(data, **change)
+
+
+def test_local_success_is_a_weighted_rate_of_the_neighbours():
+    """Against a plain double loop; lonely trials fall back on the overall rate."""
+    from ffhnet.dataset.robustness import PRIOR_WEIGHT, local_success
+    from ffhnet.geometry.rotations import geodesic_angle, matrix_from_euler_xyz
+
+    rng = np.random.default_rng(0)
+    count = 40
+    rotation = matrix_from_euler_xyz(rng.uniform(-0.4, 0.4, (count, 3)))
+    position = rng.uniform(-0.03, 0.03, (count, 3))
+    position[0] = 5.0
+    success = rng.random(count) < 0.5
+    data = TrainingData(
+        hand="h",
+        joint_names=("a",),
+        closes=np.ones(1, bool),
+        object_names=("o", "p"),
+        placement_object=np.array([0, 1]),
+        view_placement=np.array([0]),
+        bps=np.zeros((1, 8)),
+        table_height=np.zeros(1),
+        T_world_view=np.eye(4)[None],
+        trial_placement=np.arange(count) % 2,
+        rotation=rotation,
+        position=position,
+        joints=np.zeros((count, 1)),
+        closed_joints=np.zeros((count, 1)),
+        margin=np.ones(count),
+        label=success.astype(float),
+        executed=np.ones(count, bool),
+        proposer=np.zeros(count, int),
+    )
+    rate = local_success(data)
+    assert rate[0] == pytest.approx(success.mean())
+    for i in (1, 2, 17):
+        total, weight = PRIOR_WEIGHT * success.mean(), PRIOR_WEIGHT
+        for j in range(count):
+            if j != i and j % 2 == i % 2:
+                distance = np.linalg.norm(position[i] - position[j]) / 0.02
+                angle = geodesic_angle(rotation[i], rotation[j]) / np.radians(20)
+                near = np.exp(-(distance**2 + angle**2) / 2)
+                total, weight = total + near * success[j], weight + near
+        assert rate[i] == pytest.approx(total / weight)

@@ -45,6 +45,7 @@ def point_world(seed: int, objects: int = 60, views: int = 3, trials: int = 60) 
     return TrainingData(
         hand="point_hand",
         joint_names=JOINT_NAMES,
+        closes=np.ones(len(JOINT_NAMES), bool),
         object_names=tuple(f"object_{k}" for k in range(objects)),
         placement_object=np.arange(objects),
         view_placement=view_placement,
@@ -56,6 +57,7 @@ def point_world(seed: int, objects: int = 60, views: int = 3, trials: int = 60) 
         position=position,
         joints=joints,
         closed_joints=joints,
+        margin=np.ones(len(joints)),
         label=(near & executed).astype(float),
         executed=executed,
         proposer=np.zeros(len(position), dtype=int),

@@ -44,7 +44,7 @@ class GenerateOptions:
     weights: Annotated[Path | None, absent("DIR")] = None
     """Weights whose generator proposes grasps too."""
     learned: int = 0
-    """Samples of that generator per view."""
+    """Executed trials per placement of that generator."""
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)
     """Processes."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,11 +23,15 @@ from ffhnet.sampling.heuristic import PAPER, POWER, HeuristicConfig, sample_heur
 from ffhnet.sampling.perturb import perturb
 from ffhnet.simulation.physics import Physics
 from ffhnet.simulation.scene import build_scene
-from ffhnet.simulation.trial import GraspTrial, TrialResults
+from ffhnet.simulation.trial import GraspTrial
 from ffhnet.simulation.views import View, ViewMaker
 
 if TYPE_CHECKING:
     from ffhnet.inference.ffhnet import FFHNet
+
+
+DRAWS_PER_TRIAL = 20
+"""Proposals drawn for each trial that is wanted: about one in ten of the heuristic ones is free."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +47,8 @@ class GenerateConfig:
         power: executed trials per placement of the power-grasp preset of the sampler.
         perturb_rounds: rounds of perturb-and-keep.
         perturb: trials per round and placement.
-        max_collisions: start collisions kept as negatives per sampler and placement.
-        learned: samples of a trained generator per view; with `weights`.
+        max_collisions: start collisions kept as negatives per proposer and placement.
+        learned: executed trials per placement of a trained generator; with `weights`.
         weights: folder of weights, or None for no learned proposals.
     """
 
@@ -81,6 +85,7 @@ def generate(
     header = {
         "hand": hand.name,
         "joint_names": list(hand.joint_names),
+        "closes": [bool(moves) for moves in hand.closing.moves],
         "generation": dataclasses.asdict(config),
     }
     try:
@@ -138,60 +143,50 @@ class _Placement:
 
     def try_all(self) -> list[TrialBlock]:
         config = self._config
-        blocks = [
-            self._block("heuristic", *self._try_heuristic(PAPER, config.heuristic)),
-            self._block("power", *self._try_heuristic(POWER, config.power)),
+        proposers: list[tuple[str, int, Callable[[View, int], Grasps]]] = [
+            ("heuristic", config.heuristic, partial(self._sample, PAPER)),
+            ("power", config.power, partial(self._sample, POWER)),
         ]
-        for _ in range(config.perturb_rounds):
+        if config.weights is not None:
+            network = load_network(config.weights)
+            proposers.append(("learned", config.learned, partial(self._generate, network)))
+        blocks = [self._try(name, wanted, propose) for name, wanted, propose in proposers if wanted > 0]
+        for _ in range(config.perturb_rounds if config.perturb > 0 else 0):
             good = [(b.grasps[b.results.success], b.results.closed_joints[b.results.success]) for b in blocks]
             parents = Grasps.concatenate([grasps for grasps, _ in good])
-            if len(parents) == 0 or config.perturb == 0:
+            if len(parents) == 0:
                 break
             chosen = self._rng.integers(len(parents), size=config.perturb)
             closed = np.concatenate([joints for _, joints in good])[chosen]
             children = perturb(parents[chosen], closed, self._hand, self._rng)
-            blocks.append(self._block("perturb", children, self._run(children)))
-        if config.weights is not None and config.learned > 0:
-            learned = self._propose_learned(load_network(config.weights))
-            blocks.append(self._block("learned", learned, self._run(learned)))
+            blocks.append(self._block("perturb", children))
         return [block for block in blocks if len(block.grasps)]
 
-    def _block(self, proposer: str, grasps: Grasps, results: TrialResults) -> TrialBlock:
+    def _block(self, proposer: str, grasps: Grasps) -> TrialBlock:
+        results = self._trial.run(grasps, self._T_world_object)
         return TrialBlock(self._placement, proposer, grasps, results)
 
-    def _run(self, grasps: Grasps) -> TrialResults:
-        return self._trial.run(grasps, self._T_world_object)
-
-    def _try_heuristic(self, sampler: HeuristicConfig, wanted: int) -> tuple[Grasps, TrialResults]:
-        """Draws from all views until enough grasps can be executed; keeps some that collide as negatives."""
-        per_view = -(-wanted * 20 // len(self._views))
-        drawn = Grasps.concatenate(
-            [
-                sample_heuristic(*view.cloud_and_normals_world(), self._hand, per_view, self._rng, sampler)
-                for view in self._views
-            ]
-        )
+    def _try(self, name: str, wanted: int, propose: Callable[[View, int], Grasps]) -> TrialBlock:
+        """Draws from all views; runs grasps that can be executed, and some that collide as negatives."""
+        per_view = -(-wanted * DRAWS_PER_TRIAL // len(self._views))
+        drawn = Grasps.concatenate([propose(view, per_view) for view in self._views])
         drawn = drawn[self._rng.permutation(len(drawn))]
         free = self._trial.free(drawn, self._T_world_object)
         chosen = np.concatenate(
             [np.flatnonzero(free)[:wanted], np.flatnonzero(~free)[: self._config.max_collisions]]
         )
-        grasps = drawn[chosen]
-        return grasps, self._run(grasps)
+        return self._block(name, drawn[chosen])
 
-    def _propose_learned(self, network: FFHNet) -> Grasps:
-        """Raw samples of a trained generator from every view, in the world frame."""
+    def _sample(self, preset: HeuristicConfig, view: View, count: int) -> Grasps:
+        """The heuristic sampler on what a view shows, in the world frame."""
+        return sample_heuristic(*view.cloud_and_normals_world(), self._hand, count, self._rng, preset)
+
+    def _generate(self, network: FFHNet, view: View, count: int) -> Grasps:
+        """Raw samples of a trained generator, in the world frame."""
         import torch
 
         source = torch.Generator().manual_seed(int(self._rng.integers(2**31)))
-        return Grasps.concatenate(
-            [
-                network.generate(view.observation, self._config.learned, source).to_frame(
-                    view.T_world_view, "world"
-                )
-                for view in self._views
-            ]
-        )
+        return network.generate(view.observation, count, source).to_frame(view.T_world_view, "world")
 
 
 @lru_cache(maxsize=1)

@@ -70,6 +70,7 @@ def trials_table(object_name: str, blocks: list[TrialBlock]) -> pa.Table:
                     "quaternion_wxyz": _lists(quaternion_from_matrix(grasps.rotation), np.float32),
                     "joints": _lists(grasps.joints, np.float16),
                     "outcome": pa.array(outcomes).dictionary_encode(),
+                    "margin": pa.array(results.margin.astype(np.float32)),
                     "closed_joints": _lists(results.closed_joints, np.float16),
                     "contact_links": pa.array(results.contact_links.astype(np.int8)),
                     "pushed": pa.array(results.pushed.astype(np.float32)),
@@ -181,6 +182,7 @@ def read_training_data(folders: list[Path]) -> TrainingData:
     return TrainingData(
         hand=headers[0]["hand"],
         joint_names=tuple(headers[0]["joint_names"]),
+        closes=np.array(headers[0]["closes"], dtype=bool),
         object_names=tuple(objects.tolist()),
         placement_object=placement_object,
         view_placement=view_placement,
@@ -192,6 +194,7 @@ def read_training_data(folders: list[Path]) -> TrainingData:
         position=_array(trials["position"]).astype(float),
         joints=_array(trials["joints"]).astype(float),
         closed_joints=_array(trials["closed_joints"]).astype(float),
+        margin=trials["margin"].to_numpy().astype(float),
         label=(outcome == "success").astype(float),
         executed=outcome != "collision",
         proposer=np.array([PROPOSERS.index(p) for p in trials["proposer"].to_pylist()]),

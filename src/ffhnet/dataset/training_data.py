@@ -22,6 +22,7 @@ class TrainingData:
     Attributes:
         hand: name of the hand.
         joint_names: order of the joint angles.
+        closes: for each joint, whether it takes part in the closing motion.
         object_names: one name per object.
         placement_object: index into `object_names` for each placement.
         view_placement: placement that each view shows.
@@ -33,6 +34,7 @@ class TrainingData:
         position: palm origin in metres, world frame.
         joints: joint angles to which the open hand was closed, radians.
         closed_joints: joint angles that it reached, against object or limit, radians.
+        margin: share of neighbouring palm poses at which the open hand touches nothing either.
         label: success in [0, 1]; a fraction where a trial was repeated under varied physics.
         executed: False where the hand collided at the start, so that nothing was executed (label 0).
         proposer: code of what proposed the grasp.
@@ -40,6 +42,7 @@ class TrainingData:
 
     hand: str
     joint_names: tuple[str, ...]
+    closes: Bool[np.ndarray, " J"]
     object_names: tuple[str, ...]
     placement_object: Int[np.ndarray, " P"]
     view_placement: Int[np.ndarray, " V"]
@@ -51,6 +54,7 @@ class TrainingData:
     position: Float[np.ndarray, "T 3"]
     joints: Float[np.ndarray, "T J"]
     closed_joints: Float[np.ndarray, "T J"]
+    margin: Float[np.ndarray, " T"]
     label: Float[np.ndarray, " T"]
     executed: Bool[np.ndarray, " T"]
     proposer: Int[np.ndarray, " T"]
@@ -65,6 +69,7 @@ class TrainingData:
             "position": (trials, 3),
             "joints": (trials, len(self.joint_names)),
             "closed_joints": (trials, len(self.joint_names)),
+            "margin": (trials,),
             "label": (trials,),
             "executed": (trials,),
             "proposer": (trials,),
@@ -131,6 +136,7 @@ class TrainingData:
             position=self.position[trials],
             joints=self.joints[trials],
             closed_joints=self.closed_joints[trials],
+            margin=self.margin[trials],
             label=self.label[trials],
             executed=self.executed[trials],
             proposer=self.proposer[trials],

@@ -24,10 +24,10 @@ class GeneratorLoss:
     joints: Float[Tensor, ""]
     kl: Float[Tensor, ""]
 
-    def total(self, kl_weight: float) -> Float[Tensor, ""]:
-        """Eq. 3, with a KL weight that a schedule may change."""
+    def total(self, kl_weight: float, joints_weight: float = JOINTS_WEIGHT) -> Float[Tensor, ""]:
+        """Eq. 3, with a KL weight that a schedule may change and the weight of the joints."""
         reconstruction = (
-            ROTATION_WEIGHT * self.rotation + POSITION_WEIGHT * self.position + JOINTS_WEIGHT * self.joints
+            ROTATION_WEIGHT * self.rotation + POSITION_WEIGHT * self.position + joints_weight * self.joints
         )
         return reconstruction + kl_weight * self.kl
 

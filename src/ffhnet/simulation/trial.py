@@ -9,13 +9,24 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from ffhnet.geometry.transforms import make_transform
+from ffhnet.geometry.rotations import matrix_from_rotation_vector
+from ffhnet.geometry.transforms import invert, make_transform
 from ffhnet.grasps import Grasps
 from ffhnet.simulation.scene import HAND, OBJECT, TABLE, Scene
 
 SETTLE_PERIODS = 6
 SETTLE_MOTION = 0.004
 """rad: closing ends early when no joint has moved further during SETTLE_PERIODS control periods."""
+
+
+_BOTH_WAYS = np.concatenate([np.eye(3), -np.eye(3)])
+NEIGHBOURS = np.concatenate(
+    [
+        make_transform(position=0.01 * _BOTH_WAYS),
+        make_transform(matrix_from_rotation_vector(0.15 * _BOTH_WAYS)),
+    ]
+)
+"""12 × 4 × 4: the palm moved by 1 cm along, and turned by 0.15 rad about, each of its axes, both ways."""
 
 
 class Outcome(IntEnum):
@@ -35,6 +46,8 @@ class TrialResults:
 
     Attributes:
         outcome: an `Outcome`.
+        margin: share of twelve neighbouring palm poses (`NEIGHBOURS`) at which the open hand is free, too;
+            0 for start collisions.
         closed_joints: measured joint angles after closing and squeezing, rad (the grasp's if not closed).
         contact_links: number of hand links that touch the object after closing.
         pushed: m that the object moved on the table while the fingers closed.
@@ -43,6 +56,7 @@ class TrialResults:
     """
 
     outcome: Int[np.ndarray, " N"]
+    margin: Float[np.ndarray, " N"]
     closed_joints: Float[np.ndarray, "N J"]
     contact_links: Int[np.ndarray, " N"]
     pushed: Float[np.ndarray, " N"]
@@ -74,6 +88,7 @@ class TrialResults:
 class _Row:
     outcome: Outcome
     closed_joints: Float[np.ndarray, " J"]
+    margin: float = 0.0
     contact_links: int = 0
     pushed: float = 0.0
     rise: float = 0.0
@@ -98,6 +113,7 @@ class GraspTrial:
         rows = [self._run_one(grasps, i, T_world_object) for i in range(len(grasps))]
         return TrialResults(
             outcome=np.array([row.outcome for row in rows], dtype=np.int8),
+            margin=np.array([row.margin for row in rows]),
             closed_joints=np.array([row.closed_joints for row in rows]).reshape(-1, self.hand.num_joints),
             contact_links=np.array([row.contact_links for row in rows], dtype=np.int8),
             pushed=np.array([row.pushed for row in rows]),
@@ -124,6 +140,13 @@ class GraspTrial:
                 return False
         return True
 
+    def _margin(self, grasps: Grasps, i: int) -> float:
+        """Share of the neighbouring palm poses at which the open hand is free."""
+        T_world_palm = make_transform(grasps.rotation[i], grasps.position[i])
+        T_palm_root, opened = invert(self.hand.T_root_palm), self.hand.open(grasps.joints[i])
+        poses = T_world_palm @ NEIGHBOURS @ T_palm_root
+        return float(np.mean([not self._collides(pose, opened) for pose in poses]))
+
     def _collides(self, T_world_root: Float[np.ndarray, "4 4"], joints: Float[np.ndarray, " J"]) -> bool:
         scene = self._scene
         scene.place_hand(T_world_root, joints)
@@ -137,12 +160,14 @@ class GraspTrial:
         joints = grasps.joints[i]
         if not self._can_reach(grasps, i):
             return _Row(Outcome.COLLISION, joints)
+        margin = self._margin(grasps, i)
         self._reset(T_world_object)
         self._scene.place_hand(
             self.hand.root_pose(grasps.rotation[i], grasps.position[i]), self.hand.open(joints)
         )
         mujoco.mj_forward(self._scene.model, self._scene.data)
         row = self._execute(joints)
+        row.margin = margin
         if self._scene.data.warning.number[mujoco.mjtWarning.mjWARN_BADQACC] > 0:
             row.outcome = Outcome.UNSTABLE
         return row

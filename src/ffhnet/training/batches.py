@@ -79,20 +79,25 @@ class BatchMaker:
             raise DatasetError("no view shows a placement with grasps to train on")
 
     @classmethod
-    def for_generator(cls, data: TrainingData, min_local_success: float = 0.0) -> BatchMaker:
-        """Successful grasps only, with the joint angles in which the hand held the object.
+    def for_generator(
+        cls, data: TrainingData, min_local_success: float = 0.0, min_margin: float = 0.0
+    ) -> BatchMaker:
+        """Successful grasps only, with the flexion in which the hand held the object.
 
-        The angles that were asked for are mostly chance; those that were reached follow from object and
-        palm pose, and closing towards them ends in the same grasp.
+        The flexion that was asked for is mostly chance; the one that was reached follows from object and
+        palm pose, and closing towards it ends in the same grasp. Joints that do not close keep the angle
+        that was asked for: with it the hand has to come in.
 
         Args:
             data: views and trials.
             min_local_success: successes whose neighbours succeed less often are left out.
+            min_margin: successes with a smaller margin to start collisions are left out.
         """
-        good = data.success
+        good = data.success & (data.margin >= min_margin)
         if min_local_success > 0:
             good = good & (local_success(data) >= min_local_success)
-        held = dataclasses.replace(data, joints=data.closed_joints, label=np.where(good, data.label, 0.0))
+        joints = np.where(data.closes, data.closed_joints, data.joints)
+        held = dataclasses.replace(data, joints=joints, label=np.where(good, data.label, 0.0))
         return cls(held, (SUCCESS,), (1.0,))
 
     @classmethod

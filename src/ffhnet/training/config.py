@@ -8,7 +8,7 @@ from typing import Literal
 
 from ffhnet.errors import OptionError
 from ffhnet.model.config import ModelConfig
-from ffhnet.model.losses import KL_WEIGHT
+from ffhnet.model.losses import JOINTS_WEIGHT, KL_WEIGHT
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,10 @@ class TrainingConfig:
         kl_weight: final weight of the KL term (generator).
         kl_start: share of the run during which that weight is zero.
         kl_full: share of the run after which it is reached, linearly from `kl_start`.
+        joints_weight: of the joints in the reconstruction loss (generator). The weights are there to give
+            its parts equal magnitude (III-B); with joints that are reached, not asked for, 1 does.
         min_local_success: the generator leaves out successes among whose neighbours fewer succeed.
+        min_margin: the generator leaves out successes with a smaller margin to start collisions.
         shares: make-up of the evaluator's batches, or None to draw trials as they are in the data.
         seed: of the initial weights, batches and noise.
         metrics_every: steps between measurements on held-out data.
@@ -69,7 +72,9 @@ class TrainingConfig:
     kl_weight: float = KL_WEIGHT
     kl_start: float = 0.0
     kl_full: float = 0.07
+    joints_weight: float = 1.0
     min_local_success: float = 0.4
+    min_margin: float = 0.8
     shares: ClassShares | None = field(default_factory=ClassShares)
     seed: int = 0
     metrics_every: int = 200
@@ -106,7 +111,9 @@ class TrainingConfig:
             weight_decay=0.0,
             kl_start=2 / 30,
             kl_full=2 / 30,
+            joints_weight=JOINTS_WEIGHT,
             min_local_success=0.0,
+            min_margin=0.0,
             shares=ClassShares(success=0.3, failure=0.3, collision=0.0, hard_negative=0.4),
         )
 

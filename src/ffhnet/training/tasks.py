@@ -47,7 +47,7 @@ class GeneratorTask:
         self.module = module
         self.config = config
         self._device = next(module.parameters()).device
-        self._batches = BatchMaker.for_generator(data, config.min_local_success)
+        self._batches = BatchMaker.for_generator(data, config.min_local_success, config.min_margin)
         self._held_out = None
         if held_out is not None:
             self._held_out = _held_out_batch(BatchMaker.for_generator(held_out), self._device)
@@ -58,7 +58,7 @@ class GeneratorTask:
         noise = torch.randn(*batch.label.shape, self.config.model.latent, device=self._device)
         predicted, latent = self.module(batch.objects, batch.grasps, noise)
         parts = generator_loss(predicted, batch.grasps, latent)
-        total = parts.total(self.config.kl_weight_at(step))
+        total = parts.total(self.config.kl_weight_at(step), self.config.joints_weight)
         names = ("rotation", "position", "joints", "kl")
         return total, {"loss": total.item(), **{name: getattr(parts, name).item() for name in names}}
 
