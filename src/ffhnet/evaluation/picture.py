@@ -137,7 +137,7 @@ def grasp_picture(
     summary = f"{len(grasps)} grasps of {hand.name} · {len(points)} points observed"
     draw.text((width - _GAP - 4, 32), summary, fill=_FAINT, font=_font(18), anchor="rm")
     note = (
-        "Hand in its pre-shape, before the fingers close. "
+        "The hand at the grasp's joint angles, to which it closes once the palm is in place. "
         "Palm axes: x red (approach), y green, z blue. Squares: 5 cm."
     )
     draw.text((_GAP + 4, _HEADER + _BIG + _FOOTER // 2), note, fill=_FAINT, font=_font(16), anchor="lm")
