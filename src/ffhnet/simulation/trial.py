@@ -177,7 +177,8 @@ class GraspTrial:
         start = self._object_position()
         self._close(joints)
         links, _ = self._touching()
-        row = _Row(Outcome.MISSED, data.qpos[self._scene.joint_qpos].copy(), links)
+        closed = data.qpos[self._scene.joint_qpos].copy()
+        row = _Row(Outcome.MISSED, closed, contact_links=links)
         row.pushed = float(np.linalg.norm(self._object_position() - start))
         if links == 0:
             return row
