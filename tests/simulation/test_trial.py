@@ -153,7 +153,7 @@ def test_samplers_approach_the_surface(hand):
 
 def test_margin_falls_towards_collision(hand, trial):
     """Free space gives 1, touching distance less, and a pose with full margin may be moved by 1 cm."""
-    far, near = side_grasp(hand, 0.40, height=0.15), side_grasp(hand, 0.115)
+    far, near = side_grasp(hand, 0.40, height=0.15), side_grasp(hand, 0.12)
     assert trial.run(far, np.eye(4)).margin[0] == 1.0
     assert 0 < trial.run(near, np.eye(4)).margin[0] < 1
     for shift in np.concatenate([np.eye(3), -np.eye(3)]):
