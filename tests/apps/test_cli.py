@@ -4,7 +4,6 @@ import json
 import signal
 import subprocess
 import sys
-from importlib import resources
 
 import numpy as np
 import pytest
@@ -160,10 +159,6 @@ def test_a_closed_pipe_is_quiet():
     assert done.stdout.count("\n") == 1
 
 
-@pytest.mark.skipif(
-    not (resources.files("ffhnet") / "weights" / "config.json").is_file(),
-    reason="the package holds no trained weights",
-)
 def test_shipped_weights_grasp_the_example(ffhnet, tmp_path, request):
     image = request.config.rootpath / "examples" / "data" / "spray_flask_2000005_depth.png"
     out = tmp_path / "grasps.npz"

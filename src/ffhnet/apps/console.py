@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-_WIDTH = 160
+_WIDTH = 200
 """Columns of a table that goes to a file or a pipe."""
 
 

@@ -1,4 +1,4 @@
-"""`ffhnet data`: what a data set holds, and joining its files."""
+"""`ffhnet data`: what a data set holds, joining its files, and rating its trials."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from ffhnet.apps.console import print_table
+from ffhnet.apps.console import absent, busy, print_table
 from ffhnet.apps.extras import require_sim
 
 
@@ -31,18 +31,32 @@ class PackOptions:
 
 
 @dataclass(frozen=True)
+class ScoreOptions:
+    """How well an evaluator predicts the trials of a data set."""
+
+    folder: Annotated[Path, tyro.conf.Positional]
+    """A data set of objects that the evaluator has not seen."""
+    weights: Annotated[Path | None, absent("DIR", "the shipped weights")] = None
+    """Folder of weights."""
+
+
+@dataclass(frozen=True)
 class DataOptions:
-    """Show or pack a data set made by `ffhnet generate`."""
+    """Show, pack or score a data set made by `ffhnet generate`."""
 
     command: (
         Annotated[ShowOptions, tyro.conf.subcommand("show")]
         | Annotated[PackOptions, tyro.conf.subcommand("pack")]
+        | Annotated[ScoreOptions, tyro.conf.subcommand("score")]
     )
 
 
 def run(options: DataOptions) -> None:
-    """Show or pack."""
+    """Show, pack or score."""
     require_sim("data")
+    if isinstance(options.command, ScoreOptions):
+        _score(options.command)
+        return
     from ffhnet.dataset.records import pack
     from ffhnet.dataset.statistics import summarise
 
@@ -51,3 +65,20 @@ def run(options: DataOptions) -> None:
         pack(options.command.source, options.command.target)
     summary = summarise(folder)
     print_table(summary.title, summary.columns, summary.rows)
+
+
+def _score(options: ScoreOptions) -> None:
+    from ffhnet.dataset.records import read_training_data
+    from ffhnet.dataset.scoring import score
+    from ffhnet.inference.ffhnet import FFHNet
+
+    data = read_training_data([options.folder])
+    network = FFHNet.from_pretrained(options.weights, hand=data.hand, device="cpu")
+    with busy("rating the trials"):
+        scores = score(data, network.evaluator)
+    print(
+        f"{len(data.object_names)} objects, {data.num_views} views, {scores.executed} executed trials "
+        f"({scores.successes} successes), {scores.collisions} start collisions\n"
+        f"AUROC {scores.auroc_executed:.3f} on executed trials, {scores.auroc_all:.3f} with collisions; "
+        f"ECE {scores.ece_executed:.3f} on executed trials"
+    )

@@ -85,10 +85,9 @@ def run(options: GraspOptions) -> None:
         hand = wanted or load_hand(network.info.hand)
     with busy("sampling and ranking grasps"):
         grasps = network.grasp(observation, options.num, options.seed, options.threshold)
-    _show(grasps, hand)
+    # Files before anything is printed: a reader that closes the pipe early must not cost them.
     if options.out is not None:
         save_grasps(grasps, options.out)
-        print(f"{len(grasps)} grasps written to {options.out}")
     if options.plot is not None:
         if len(grasps) == 0:
             raise OptionError(f"nothing to plot: no grasp reaches the threshold {options.threshold:g}")
@@ -96,6 +95,10 @@ def run(options: GraspOptions) -> None:
             from ffhnet.evaluation.picture import grasp_picture
 
             grasp_picture(observation, grasps, hand, options.plot, title=options.input.name)
+    _show(grasps, hand)
+    if options.out is not None:
+        print(f"{len(grasps)} grasps written to {options.out}")
+    if options.plot is not None:
         print(f"picture written to {options.plot}")
 
 
