@@ -46,8 +46,7 @@ def fingertips_in_root(hand, joints):
 def test_fingertip_table(hand, angles, table):
     tips = fingertips_in_root(hand, np.tile(angles, 5))
     for finger, position in table.items():
-        # The table is rounded to 0.1 mm (straight) and 1 mm (bent): half a unit beside the 0.5 mm asked for.
-        np.testing.assert_allclose(tips[finger], position, atol=5.5e-4 if table is STRAIGHT else 1e-3)
+        np.testing.assert_allclose(tips[finger], position, atol=5e-4)
 
 
 def test_forward_kinematics_matches_mujoco(hand, model):
