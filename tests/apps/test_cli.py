@@ -143,8 +143,10 @@ def test_hand_check_finds_eigengrasps_out_of_range(ffhnet, tmp_path):
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 def test_ctrl_c_is_quiet():
     """An interrupt in the middle of the work: status 130 and not a word."""
-    interrupt = "import os, signal; os.kill(os.getpid(), signal.SIGINT)"
-    code = f"import ffhnet.apps.objects as o\ndef stop(options):\n    {interrupt}\no._list = stop\n{MAIN}"
+    interrupt = "os.kill(os.getpid(), signal.SIGINT)"
+    # A parent in the background may have left SIGINT ignored.
+    code = "import os, signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    code += f"import ffhnet.apps.objects as o\ndef stop(options):\n    {interrupt}\no._list = stop\n{MAIN}"
     done = subprocess.run(
         [sys.executable, "-c", code, "objects", "list"], capture_output=True, text=True, check=False
     )
