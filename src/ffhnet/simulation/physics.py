@@ -13,7 +13,7 @@ class Physics:
     """Simulator settings and the definition of success.
 
     Attributes:
-        timestep: s. Labels at this step agree with those at a quarter of it (see `docs/figures.md`).
+        timestep: s. How far labels depend on it: `docs/figures.md`, "Labels".
         control_period: s between updates of the finger targets; a multiple of the timestep.
         friction: sliding, torsional (m), rolling (m) coefficients of every contact.
         contact_time_constant: s of MuJoCo's soft contact (solref); at least two timesteps.
