@@ -43,7 +43,7 @@ def main(options: Options) -> None:
     for seed in track(procedural_split("test", options.objects), description="objects"):
         obj, rng = make_object(seed), np.random.default_rng([options.seed, seed])
         pose = obj.resting_poses[0]
-        cloud, normals = ViewMaker(obj, pose).take(rng).cloud_and_normals_world()
+        cloud, normals = ViewMaker(obj, pose).take(rng).cloud_and_normals_world
         trial = GraspTrial(build_scene(hand, obj, shipped))
         drawn = Grasps.concatenate(
             [

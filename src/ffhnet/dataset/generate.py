@@ -19,7 +19,7 @@ from ffhnet.grasps import Grasps
 from ffhnet.hands import DEFAULT_HAND, load_hand
 from ffhnet.objects.grasp_object import GraspObject
 from ffhnet.objects.procedural import make_object, object_name
-from ffhnet.sampling.heuristic import PAPER, POWER, HeuristicConfig, sample_heuristic
+from ffhnet.sampling.heuristic import DRAWS_PER_TRIAL, PAPER, POWER, HeuristicConfig, sample_heuristic
 from ffhnet.sampling.perturb import perturb
 from ffhnet.simulation.physics import Physics
 from ffhnet.simulation.scene import build_scene
@@ -28,10 +28,6 @@ from ffhnet.simulation.views import View, ViewMaker
 
 if TYPE_CHECKING:
     from ffhnet.inference.ffhnet import FFHNet
-
-
-DRAWS_PER_TRIAL = 20
-"""Proposals drawn for each trial that is wanted: about one in ten of the heuristic ones is free."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +144,7 @@ class _Placement:
             ("power", config.power, partial(self._sample, POWER)),
         ]
         if config.weights is not None:
-            network = load_network(config.weights)
+            network = _load_network(config.weights)
             proposers.append(("learned", config.learned, partial(self._generate, network)))
         blocks = [self._try(name, wanted, propose) for name, wanted, propose in proposers if wanted > 0]
         for _ in range(config.perturb_rounds if config.perturb > 0 else 0):
@@ -179,7 +175,7 @@ class _Placement:
 
     def _sample(self, preset: HeuristicConfig, view: View, count: int) -> Grasps:
         """The heuristic sampler on what a view shows, in the world frame."""
-        return sample_heuristic(*view.cloud_and_normals_world(), self._hand, count, self._rng, preset)
+        return sample_heuristic(*view.cloud_and_normals_world, self._hand, count, self._rng, preset)
 
     def _generate(self, network: FFHNet, view: View, count: int) -> Grasps:
         """Raw samples of a trained generator, in the world frame."""
@@ -190,7 +186,7 @@ class _Placement:
 
 
 @lru_cache(maxsize=1)
-def load_network(weights: str) -> FFHNet:
+def _load_network(weights: str) -> FFHNet:
     """Networks of a worker process, loaded once."""
     import torch
 

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float
 from ffhnet.hands import load_hand
 from ffhnet.inference.ffhnet import FFHNet
 from ffhnet.objects.catalogue import ObjectSource
-from ffhnet.sampling.heuristic import PAPER, sample_heuristic
+from ffhnet.sampling.heuristic import DRAWS_PER_TRIAL, PAPER, sample_heuristic
 from ffhnet.simulation.physics import Physics
 from ffhnet.simulation.scene import build_scene
 from ffhnet.simulation.trial import GraspTrial
@@ -102,6 +102,7 @@ def _heuristic(
     rng: np.random.Generator,
 ) -> Bool[np.ndarray, " H"]:
     """Success of the paper's sampler on the same view, after its collision filter (Table II)."""
-    grasps = sample_heuristic(*view.cloud_and_normals_world(), trial.hand, 20 * wanted, rng, PAPER)
+    count = DRAWS_PER_TRIAL * wanted
+    grasps = sample_heuristic(*view.cloud_and_normals_world, trial.hand, count, rng, PAPER)
     free = np.flatnonzero(trial.free(grasps, T_world_object))[:wanted]
     return trial.run(grasps[free], T_world_object).success

@@ -42,6 +42,10 @@ POWER = HeuristicConfig(offset=(0.0, 0.03), reference=(0.075, 0.0, 0.025), tilt=
 power grasps. Twice the success of `PAPER` on the same views (see `docs/figures.md`)."""
 
 
+DRAWS_PER_TRIAL = 20
+"""Proposals drawn for each trial that is wanted: about one in ten heuristic ones is free of collisions."""
+
+
 def sample_heuristic(
     cloud: Float[np.ndarray, "M 3"],
     normals: Float[np.ndarray, "M 3"],

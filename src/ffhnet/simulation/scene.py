@@ -34,7 +34,6 @@ class Scene:
     """
 
     hand: Hand
-    obj: GraspObject
     physics: Physics
     model: mujoco.MjModel
     data: mujoco.MjData
@@ -98,7 +97,7 @@ def build_scene(hand: Hand, obj: GraspObject, physics: Physics | None = None) ->
         equality.solref = [physics.contact_time_constant, 1.0]
         equality.solimp[:3] = [0.95, 0.99, 0.001]
     model = spec.compile()
-    return _index(hand, obj, physics, model)
+    return _index(hand, physics, model)
 
 
 def _set_options(spec: mujoco.MjSpec, physics: Physics) -> None:
@@ -116,7 +115,7 @@ def _set_options(spec: mujoco.MjSpec, physics: Physics) -> None:
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_MULTICCD
 
 
-def _index(hand: Hand, obj: GraspObject, physics: Physics, model: mujoco.MjModel) -> Scene:
+def _index(hand: Hand, physics: Physics, model: mujoco.MjModel) -> Scene:
     hand_body = model.body("hand").id
     object_body = model.body("object").id
     root = model.body_rootid[model.geom_bodyid]
@@ -124,7 +123,6 @@ def _index(hand: Hand, obj: GraspObject, physics: Physics, model: mujoco.MjModel
     couplings = hand.tree.couplings
     return Scene(
         hand=hand,
-        obj=obj,
         physics=physics,
         model=model,
         data=mujoco.MjData(model),

@@ -221,7 +221,7 @@ class GraspTrial:
         target = self.hand.open(joints)
         way = joints - target
         arriving = max(round(way.max() / step), 1)
-        settled = self.hand.open(joints)
+        settled = target
         for k in range(round(closing.duration / self._physics.control_period)):
             measured = scene.data.qpos[scene.joint_qpos]
             if k > arriving and k % SETTLE_PERIODS == 0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import trimesh
@@ -11,7 +12,7 @@ from jaxtyping import Float
 from ffhnet.errors import CloudError, SceneError
 from ffhnet.geometry.transforms import apply
 from ffhnet.objects.grasp_object import GraspObject
-from ffhnet.perception.camera import PRESETS, Intrinsics, random_camera, render_depth
+from ffhnet.perception.camera import PRESETS, random_camera, render_depth
 from ffhnet.perception.cloud import estimate_normals
 from ffhnet.perception.observation import Observation, observe_depth
 from ffhnet.perception.raycast import RayScene
@@ -27,20 +28,17 @@ class View:
     Attributes:
         observation: in the camera frame, as a real camera would give it.
         T_world_camera: where the camera stands.
-        depth: noisy depth image, m.
-        intrinsics: of the camera.
     """
 
     observation: Observation
     T_world_camera: Float[np.ndarray, "4 4"]
-    depth: Float[np.ndarray, "H W"]
-    intrinsics: Intrinsics
 
     @property
     def T_world_view(self) -> Float[np.ndarray, "4 4"]:
         """Pose of the view frame in the world."""
         return self.T_world_camera @ self.observation.T_input_view
 
+    @cached_property
     def cloud_and_normals_world(self) -> tuple[Float[np.ndarray, "M 3"], Float[np.ndarray, "M 3"]]:
         """Visible points (m) and outward normals in the world frame."""
         cloud = apply(self.T_world_camera, self.observation.cloud)
@@ -72,5 +70,5 @@ class ViewMaker:
                 observation = observe_depth(depth, intrinsics, rng)
             except (CloudError, SceneError):
                 continue
-            return View(observation, T_world_camera, depth, intrinsics)
+            return View(observation, T_world_camera)
         raise SceneError(f"{self._name} could not be segmented in {MAX_ATTEMPTS} simulated views")
