@@ -10,23 +10,24 @@ import time
 import numpy as np
 import pytest
 
-from ffhnet.dataset.generate import GenerateConfig, generate
+from ffhnet.dataset.generate import generate
+from ffhnet.dataset.object_trials import GenerateConfig
 from ffhnet.dataset.records import pack, read_header, read_tables, read_training_data
 from ffhnet.dataset.statistics import summarise
 from ffhnet.errors import DatasetError
-from ffhnet.objects.procedural import make_object, object_name, procedural_split
+from ffhnet.objects.catalogue import resolve_objects
 from ffhnet.simulation.scene import build_scene
 from ffhnet.simulation.trial import GraspTrial
 
-SEEDS = procedural_split("test", 3)
+SOURCES = resolve_objects("procedural-test:3")
 SMALL = GenerateConfig(
     placements=1, views=2, heuristic=4, power=4, perturb_rounds=1, perturb=6, max_collisions=3
 )
 
 
-def run(out, workers=1, seeds=SEEDS[:2]):
+def run(out, workers=1, sources=SOURCES[:2]):
     done = []
-    generate(seeds, out, SMALL, workers, done.append)
+    generate(sources, out, SMALL, workers, done.append)
     return done
 
 
@@ -47,7 +48,7 @@ def contents(folder):
 
 def test_what_is_written(data_set):
     trials, views = read_tables(data_set, "trials"), read_tables(data_set, "views")
-    assert set(trials["object"].to_pylist()) == {object_name(seed) for seed in SEEDS[:2]}
+    assert set(trials["object"].to_pylist()) == {source.name for source in SOURCES[:2]}
     assert len(views) == 4
     proposer, outcome = np.array(trials["proposer"].to_pylist()), np.array(trials["outcome"].to_pylist())
     for name in ("heuristic", "power"):
@@ -72,13 +73,13 @@ def test_finished_objects_are_left_alone(data_set):
 
 def test_other_settings_are_refused(data_set):
     with pytest.raises(DatasetError, match="other settings"):
-        generate(SEEDS[:1], data_set, GenerateConfig(), 1, print)
+        generate(SOURCES[:1], data_set, GenerateConfig(), 1, print)
 
 
 def test_stored_labels_come_again_from_physics(data_set):
     """Grasps read back from the file earn the labels that stand beside them."""
     data = read_training_data([data_set])
-    obj = make_object(SEEDS[0])
+    obj = SOURCES[0].load()
     number = data.object_names.index(obj.name)
     mine = np.flatnonzero(data.placement_object[data.trial_placement] == number)
     from ffhnet.grasps import Grasps
@@ -123,9 +124,11 @@ def test_a_killed_job_goes_on_and_ends_with_the_same_files(data_set, tmp_path):
     out = tmp_path / "killed"
     script = (
         "from pathlib import Path\n"
-        "from ffhnet.dataset.generate import GenerateConfig, generate\n"
+        "from ffhnet.dataset.generate import generate\n"
+        "from ffhnet.dataset.object_trials import GenerateConfig\n"
+        "from ffhnet.objects.catalogue import resolve_objects\n"
         "if __name__ == '__main__':\n"
-        f"    generate({SEEDS[:2]!r}, Path({str(out)!r}), {SMALL!r}, 1, print)\n"
+        f"    generate(resolve_objects('procedural-test:2'), Path({str(out)!r}), {SMALL!r}, 1, print)\n"
     )
     program = tmp_path / "job.py"
     program.write_text("from ffhnet.simulation.physics import Physics\n" + script, encoding="utf-8")

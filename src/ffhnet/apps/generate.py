@@ -52,9 +52,10 @@ class GenerateOptions:
 def run(options: GenerateOptions) -> None:
     """Generate, then print what the data set holds."""
     require_sim("generate")
-    from ffhnet.dataset.generate import GenerateConfig, generate
+    from ffhnet.dataset.generate import generate
+    from ffhnet.dataset.object_trials import GenerateConfig
     from ffhnet.dataset.statistics import summarise
-    from ffhnet.objects.procedural import procedural_split
+    from ffhnet.objects.catalogue import resolve_objects
 
     if options.count < 1 or options.first < 0 or options.workers < 1:
         raise OptionError("--count and --workers must be at least 1, --first at least 0")
@@ -70,8 +71,8 @@ def run(options: GenerateOptions) -> None:
         learned=options.learned,
         weights=None if options.weights is None else str(options.weights),
     )
-    seeds = procedural_split(options.split, options.first + options.count)[options.first :]
-    with progress_bar("objects", len(seeds)) as step:
-        generate(seeds, options.out, config, options.workers, lambda _: step())
+    sources = resolve_objects(f"procedural-{options.split}:{options.first + options.count}")[options.first :]
+    with progress_bar("objects", len(sources)) as step:
+        generate(sources, options.out, config, options.workers, lambda _: step())
     summary = summarise(options.out)
     print_table(summary.title, summary.columns, summary.rows)

@@ -1,74 +1,30 @@
-"""The generation job (section IV-B): views, proposals, trials, one pair of Parquet files per object."""
+"""The generation job (section IV-B): one object is one unit of work and one pair of Parquet files."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import lru_cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-import numpy as np
-import pyarrow as pa
 
 from ffhnet.dataset.executors import run_jobs
-from ffhnet.dataset.records import TrialBlock, ViewRow, trials_table, views_table, write_header, write_table
-from ffhnet.errors import DatasetError, SceneError
-from ffhnet.grasps import Grasps
-from ffhnet.hands import DEFAULT_HAND, load_hand
-from ffhnet.objects.grasp_object import GraspObject
-from ffhnet.objects.procedural import make_object, object_name
-from ffhnet.sampling.heuristic import DRAWS_PER_TRIAL, PAPER, POWER, HeuristicConfig, sample_heuristic
-from ffhnet.sampling.perturb import perturb
-from ffhnet.simulation.physics import Physics
-from ffhnet.simulation.scene import build_scene
-from ffhnet.simulation.trial import GraspTrial
-from ffhnet.simulation.views import View, ViewMaker
-
-if TYPE_CHECKING:
-    from ffhnet.inference.ffhnet import FFHNet
-
-
-@dataclass(frozen=True)
-class GenerateConfig:
-    """What is tried on each object.
-
-    Attributes:
-        hand: name of the hand.
-        seed: of all randomness, together with the object's seed.
-        placements: resting poses per object, at most.
-        views: simulated views per placement.
-        heuristic: executed trials per placement of the paper's sampler.
-        power: executed trials per placement of the power-grasp preset of the sampler.
-        perturb_rounds: rounds of perturb-and-keep.
-        perturb: trials per round and placement.
-        max_collisions: start collisions kept as negatives per proposer and placement.
-        learned: executed trials per placement of a trained generator; with `weights`.
-        weights: folder of weights, or None for no learned proposals.
-    """
-
-    hand: str = DEFAULT_HAND
-    seed: int = 0
-    placements: int = 2
-    views: int = 6
-    heuristic: int = 30
-    power: int = 30
-    perturb_rounds: int = 2
-    perturb: int = 50
-    max_collisions: int = 30
-    learned: int = 0
-    weights: str | None = None
-    physics: Physics = field(default_factory=Physics)
+from ffhnet.dataset.object_trials import GenerateConfig, try_object
+from ffhnet.dataset.records import trials_table, views_table, write_header, write_table
+from ffhnet.errors import DatasetError
+from ffhnet.hands import load_hand
+from ffhnet.objects.catalogue import ObjectSource
 
 
 def generate(
-    seeds: list[int], out: Path, config: GenerateConfig, workers: int, on_done: Callable[[str], None]
+    sources: list[ObjectSource],
+    out: Path,
+    config: GenerateConfig,
+    workers: int,
+    on_done: Callable[[str], None],
 ) -> None:
-    """Runs the job for procedural objects; objects that are already there are left alone.
+    """Runs the job; objects that are already there are left alone.
 
     Args:
-        seeds: of the procedural objects.
+        sources: the objects.
         out: folder of the data set; made, or gone on with.
         config: what is tried.
         workers: processes.
@@ -88,109 +44,21 @@ def generate(
         write_header(out, header)
     except OSError as error:
         raise DatasetError(f"cannot write the data set {out}: {error}") from error
-    todo = [seed for seed in seeds if not _trials_path(out, object_name(seed)).exists()]
-    run_jobs(_generate_object, [(seed, out, config) for seed in todo], workers, on_done)
+    todo = [source for source in sources if not _trials_path(out, source.name).exists()]
+    run_jobs(_generate_object, [(source, out, config) for source in todo], workers, on_done)
 
 
 def _trials_path(out: Path, name: str) -> Path:
     return out / "trials" / f"{name}.parquet"
 
 
-def _generate_object(job: tuple[int, Path, GenerateConfig]) -> str:
-    """One unit of work: everything about one object, decided by its seed and the configuration alone."""
-    seed, out, config = job
-    obj = make_object(seed)
-    blocks: list[TrialBlock] = []
-    views: list[pa.Table] = []
-    for placement in range(min(config.placements, len(obj.resting_poses))):
-        rng = np.random.default_rng([config.seed, seed, placement])
-        try:
-            worker = _Placement(obj, placement, config, rng)
-        except SceneError:
-            # Too flat to be told from the table: nothing can be observed, so nothing is tried.
-            continue
-        blocks += worker.try_all()
-        views.append(views_table(obj.name, placement, worker.view_rows()))
-    if blocks:
-        write_table(pa.concat_tables(views).unify_dictionaries(), out / "views" / f"{obj.name}.parquet")
+def _generate_object(job: tuple[ObjectSource, Path, GenerateConfig]) -> str:
+    """One unit of work: everything about one object."""
+    source, out, config = job
+    obj = source.load()
+    trials, views = try_object(obj, config)
+    if trials:
+        write_table(views_table(obj.name, views), out / "views" / f"{obj.name}.parquet")
         # Last, because this file says that the object is done.
-        write_table(trials_table(obj.name, blocks), _trials_path(out, obj.name))
+        write_table(trials_table(obj.name, trials), _trials_path(out, obj.name))
     return obj.name
-
-
-class _Placement:
-    """One object at rest, its views, and the trials on it."""
-
-    def __init__(
-        self, obj: GraspObject, placement: int, config: GenerateConfig, rng: np.random.Generator
-    ) -> None:
-        self._config, self._placement, self._rng = config, placement, rng
-        self._hand = load_hand(config.hand)
-        self._T_world_object = obj.resting_poses[placement]
-        self._trial = GraspTrial(build_scene(self._hand, obj, config.physics))
-        maker = ViewMaker(obj, self._T_world_object)
-        self._views: list[View] = [maker.take(rng) for _ in range(config.views)]
-
-    def view_rows(self) -> list[ViewRow]:
-        return [
-            ViewRow(view.observation.bps, view.observation.table_height, view.T_world_view)
-            for view in self._views
-        ]
-
-    def try_all(self) -> list[TrialBlock]:
-        config = self._config
-        proposers: list[tuple[str, int, Callable[[View, int], Grasps]]] = [
-            ("heuristic", config.heuristic, partial(self._sample, PAPER)),
-            ("power", config.power, partial(self._sample, POWER)),
-        ]
-        if config.weights is not None:
-            network = _load_network(config.weights)
-            proposers.append(("learned", config.learned, partial(self._generate, network)))
-        blocks = [self._try(name, wanted, propose) for name, wanted, propose in proposers if wanted > 0]
-        for _ in range(config.perturb_rounds if config.perturb > 0 else 0):
-            good = [(b.grasps[b.results.success], b.results.closed_joints[b.results.success]) for b in blocks]
-            parents = Grasps.concatenate([grasps for grasps, _ in good])
-            if len(parents) == 0:
-                break
-            chosen = self._rng.integers(len(parents), size=config.perturb)
-            closed = np.concatenate([joints for _, joints in good])[chosen]
-            children = perturb(parents[chosen], closed, self._hand, self._rng)
-            blocks.append(self._block("perturb", children))
-        return [block for block in blocks if len(block.grasps)]
-
-    def _block(self, proposer: str, grasps: Grasps) -> TrialBlock:
-        results = self._trial.run(grasps, self._T_world_object)
-        return TrialBlock(self._placement, proposer, grasps, results)
-
-    def _try(self, name: str, wanted: int, propose: Callable[[View, int], Grasps]) -> TrialBlock:
-        """Draws from all views; runs grasps that can be executed, and some that collide as negatives."""
-        per_view = -(-wanted * DRAWS_PER_TRIAL // len(self._views))
-        drawn = Grasps.concatenate([propose(view, per_view) for view in self._views])
-        drawn = drawn[self._rng.permutation(len(drawn))]
-        free = self._trial.free(drawn, self._T_world_object)
-        chosen = np.concatenate(
-            [np.flatnonzero(free)[:wanted], np.flatnonzero(~free)[: self._config.max_collisions]]
-        )
-        return self._block(name, drawn[chosen])
-
-    def _sample(self, preset: HeuristicConfig, view: View, count: int) -> Grasps:
-        """The heuristic sampler on what a view shows, in the world frame."""
-        return sample_heuristic(*view.cloud_and_normals_world, self._hand, count, self._rng, preset)
-
-    def _generate(self, network: FFHNet, view: View, count: int) -> Grasps:
-        """Raw samples of a trained generator, in the world frame."""
-        import torch
-
-        source = torch.Generator().manual_seed(int(self._rng.integers(2**31)))
-        return network.generate(view.observation, count, source).to_frame(view.T_world_view, "world")
-
-
-@lru_cache(maxsize=1)
-def _load_network(weights: str) -> FFHNet:
-    """Networks of a worker process, loaded once."""
-    import torch
-
-    from ffhnet.inference.ffhnet import FFHNet
-
-    torch.set_num_threads(1)
-    return FFHNet.from_pretrained(weights, device="cpu")

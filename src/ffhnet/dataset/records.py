@@ -44,6 +44,14 @@ class ViewRow:
 
 
 @dataclass(frozen=True)
+class ViewBlock:
+    """Views of one placement."""
+
+    placement: int
+    rows: list[ViewRow]
+
+
+@dataclass(frozen=True)
 class TrialBlock:
     """Trials of one proposer on one placement; grasps in the world frame."""
 
@@ -82,13 +90,14 @@ def trials_table(object_name: str, blocks: list[TrialBlock]) -> pa.Table:
     return pa.concat_tables(tables).unify_dictionaries()
 
 
-def views_table(object_name: str, placement: int, rows: list[ViewRow]) -> pa.Table:
+def views_table(object_name: str, blocks: list[ViewBlock]) -> pa.Table:
     """Arrow table of views."""
-    n = len(rows)
+    rows = [row for block in blocks for row in block.rows]
+    placement = [block.placement for block in blocks for _ in block.rows]
     return pa.table(
         {
-            "object": pa.array([object_name] * n).dictionary_encode(),
-            "placement": pa.array(np.full(n, placement, np.int8)),
+            "object": pa.array([object_name] * len(rows)).dictionary_encode(),
+            "placement": pa.array(np.array(placement, np.int8)),
             "bps": _lists(np.stack([row.bps for row in rows]), np.float16),
             "table_height": pa.array(np.array([row.table_height for row in rows], np.float32)),
             "T_world_view": _lists(np.stack([row.T_world_view.ravel() for row in rows]), np.float32),

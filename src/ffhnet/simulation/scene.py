@@ -60,6 +60,15 @@ class Scene:
         self.data.qpos[q : q + 3] = T_world_object[:3, 3]
         self.data.qpos[q + 3 : q + 7] = quaternion_from_matrix(T_world_object[:3, :3])
 
+    def raise_hand(self, height: float) -> None:
+        """Moves the hand to a height (m) over where it closed, seen from the table."""
+        self.data.mocap_pos[self.table_mocap, 2] = -height
+
+    @property
+    def table_z(self) -> float:
+        """World z of the table top, m."""
+        return float(self.data.mocap_pos[self.table_mocap, 2])
+
 
 TABLE, OBJECT, HAND = 0, 1, 2
 PREFIX = "hand/"

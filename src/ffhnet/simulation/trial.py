@@ -184,12 +184,12 @@ class GraspTrial:
             return row
 
         row.outcome = Outcome.SLIPPED
-        for sunk in _quintic(physics.lift_duration, physics.control_period) * physics.lift_height:
-            data.mocap_pos[self._scene.table_mocap, 2] = -sunk
+        for height in _quintic(physics.lift_duration, physics.control_period) * physics.lift_height:
+            self._scene.raise_hand(height)
             self._advance()
-            row.rise = float(self._object_position()[2] - start[2] + sunk)
+            row.rise = self._object_height() - start[2]
             # An object that lags by 10 cm has been left on the table or is falling.
-            if sunk - row.rise > 0.10 or (sunk - row.rise > 0.01 and self._touching()[0] == 0):
+            if height - row.rise > 0.10 or (height - row.rise > 0.01 and self._touching()[0] == 0):
                 return row
         if row.rise < physics.min_rise:
             return row
@@ -198,7 +198,7 @@ class GraspTrial:
         held = self._object_position()
         for _ in range(round(physics.hold_duration / physics.control_period)):
             self._advance()
-        row.rise = float(self._object_position()[2] - start[2] + physics.lift_height)
+        row.rise = self._object_height() - start[2]
         row.hold_slip = float(np.linalg.norm(self._object_position() - held))
         links, on_table = self._touching()
         if (
@@ -243,6 +243,10 @@ class GraspTrial:
     def _object_position(self) -> Float[np.ndarray, 3]:
         """Centre of mass of the object, world frame."""
         return self._scene.data.xipos[self._scene.object_body].copy()
+
+    def _object_height(self) -> float:
+        """Height of the object's centre of mass over the table, m."""
+        return float(self._object_position()[2]) - self._scene.table_z
 
     def _touching(self) -> tuple[int, bool]:
         """How many hand links touch the object, and whether the table does."""
