@@ -1,0 +1,1 @@
+"""The Franka Emika Panda arm: kinematics, reachability, and trials with the hand on the arm."""

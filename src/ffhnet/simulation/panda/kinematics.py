@@ -1,0 +1,150 @@
+"""Kinematics of the Franka Emika Panda: forward in plain NumPy, inverse in closed form and verified.
+
+Frames: `base` is link 0, z up, x to the front; `flange` is the plate that carries the hand (link 8).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ffhnet.errors import MissingExtraError
+
+LOWER = np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973])
+"""Lower joint limits, rad."""
+UPPER = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
+"""Upper joint limits, rad."""
+MAX_SPEED = np.array([2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61])
+"""Joint speed limits, rad/s."""
+
+_A = np.array([0.0, 0.0, 0.0, 0.0825, -0.0825, 0.0, 0.088])
+_D = np.array([0.333, 0.0, 0.316, 0.0, 0.384, 0.0, 0.0])
+_ALPHA = np.pi / 2 * np.array([0, -1, 1, 1, -1, 1, 1])
+_FLANGE = 0.107
+
+POSITION_TOLERANCE = 5e-4
+"""m by which an accepted solution may miss the wanted pose."""
+ROTATION_TOLERANCE = 5e-3
+"""rad by which an accepted solution may miss the wanted pose."""
+
+_ANY_Q7 = np.linspace(LOWER[6], UPPER[6], 26)[1:-1]
+_DAMPING = 1e-4
+
+
+def joint_frames(q: Float[np.ndarray, "*batch 7"]) -> Float[np.ndarray, "*batch 8 4 4"]:
+    """T_base_link of links 1 to 7 and the flange, from modified Denavit-Hartenberg parameters (Craig).
+
+    Args:
+        q: joint angles, rad.
+    """
+    cos, sin = np.cos(q), np.sin(q)
+    cos_alpha, sin_alpha = np.cos(_ALPHA), np.sin(_ALPHA)
+    step = np.zeros((*q.shape[:-1], 7, 4, 4))
+    step[..., 0, 0], step[..., 0, 1], step[..., 0, 3] = cos, -sin, _A
+    step[..., 1, 0], step[..., 1, 1] = sin * cos_alpha, cos * cos_alpha
+    step[..., 1, 2], step[..., 1, 3] = -sin_alpha, -sin_alpha * _D
+    step[..., 2, 0], step[..., 2, 1] = sin * sin_alpha, cos * sin_alpha
+    step[..., 2, 2], step[..., 2, 3] = cos_alpha, cos_alpha * _D
+    step[..., 3, 3] = 1.0
+    frames = np.empty((*q.shape[:-1], 8, 4, 4))
+    frames[..., 0, :, :] = step[..., 0, :, :]
+    for i in range(1, 7):
+        frames[..., i, :, :] = frames[..., i - 1, :, :] @ step[..., i, :, :]
+    frames[..., 7, :, :] = frames[..., 6, :, :]
+    frames[..., 7, :3, 3] += _FLANGE * frames[..., 6, :3, 2]
+    return frames
+
+
+def forward(q: Float[np.ndarray, "*batch 7"]) -> Float[np.ndarray, "*batch 4 4"]:
+    """T_base_flange of joint angles (rad)."""
+    return joint_frames(q)[..., 7, :, :]
+
+
+def within_limits(q: Float[np.ndarray, "*batch 7"]) -> Bool[np.ndarray, "*batch"]:
+    """Whether all joints are within their limits; False for NaN."""
+    return np.asarray(((q >= LOWER) & (q <= UPPER)).all(axis=-1))
+
+
+def pose_error(
+    q: Float[np.ndarray, "*batch 7"], T_base_flange: Float[np.ndarray, "*batch 4 4"]
+) -> Float[np.ndarray, "*batch 6"]:
+    """From the flange to where it should be: position (m), small rotation vector (rad), base frame."""
+    T_base_now = forward(q)
+    # Half the sum of the crossed axes is the rotation vector times sin(angle) / angle.
+    turn = np.cross(T_base_now[..., :3, :3], T_base_flange[..., :3, :3], axisa=-2, axisb=-2).sum(axis=-2) / 2
+    return np.concatenate([T_base_flange[..., :3, 3] - T_base_now[..., :3, 3], turn], axis=-1)
+
+
+def reaches(
+    q: Float[np.ndarray, "*batch 7"], T_base_flange: Float[np.ndarray, "*batch 4 4"]
+) -> Bool[np.ndarray, "*batch"]:
+    """Whether joint angles are within limits and put the flange at the pose, within the tolerances above."""
+    error = pose_error(q, T_base_flange)
+    position, rotation = np.linalg.norm(error[..., :3], axis=-1), np.linalg.norm(error[..., 3:], axis=-1)
+    return within_limits(q) & (position <= POSITION_TOLERANCE) & (rotation <= ROTATION_TOLERANCE)
+
+
+def least_motion(
+    q: Float[np.ndarray, "*batch 7"], twist: Float[np.ndarray, "*batch 6"]
+) -> Float[np.ndarray, "*batch 7"]:
+    """The smallest joint motion (rad) that moves the flange by a small twist.
+
+    Args:
+        q: joint angles, rad.
+        twist: position (m) and rotation vector (rad) in the base frame.
+    """
+    frames = joint_frames(q)
+    axes = frames[..., :7, :3, 2]
+    arm = frames[..., 7, None, :3, 3] - frames[..., :7, :3, 3]
+    transposed = np.concatenate([np.cross(axes, arm), axes], axis=-1)
+    square = transposed.swapaxes(-1, -2) @ transposed + _DAMPING**2 * np.eye(6)
+    return np.asarray((transposed @ np.linalg.solve(square, twist[..., None]))[..., 0])
+
+
+def refine(
+    q: Float[np.ndarray, "*batch 7"], T_base_flange: Float[np.ndarray, "*batch 4 4"], steps: int = 3
+) -> Float[np.ndarray, "*batch 7"]:
+    """Joint angles moved to the pose by damped Newton steps, which stay on the branch of a start near by."""
+    for _ in range(steps):
+        q = q + least_motion(q, pose_error(q, T_base_flange))
+    return q
+
+
+def inverse(
+    T_base_flange: Float[np.ndarray, "N 4 4"], q7: Float[np.ndarray, " R"] = _ANY_Q7
+) -> Float[np.ndarray, "N R 4 7"]:
+    """All closed-form solutions for each pose and each value of the redundant last joint; NaN where none is.
+
+    The geometric solution is that of He and Liu (2021), as the package `frankik` has it; what it returns is
+    only believed after our own forward kinematics.
+
+    Args:
+        T_base_flange: wanted poses of the flange.
+        q7: values of joint 7 to try, rad.
+
+    Raises:
+        MissingExtraError: `frankik` is not installed.
+    """
+    ik_full = _closed_form()
+    home = np.zeros(7)
+    found = np.array([[ik_full(pose, home, value) for value in q7] for pose in T_base_flange])
+    found = found.reshape(len(T_base_flange), len(q7), 4, 7)
+    ok = ~np.isnan(found).any(axis=-1)
+    wanted = np.broadcast_to(T_base_flange[:, None, None], (*found.shape[:-1], 4, 4))[ok]
+    solutions = found[ok]
+    solutions[~reaches(solutions, wanted)] = np.nan
+    found[ok] = solutions
+    found[~ok] = np.nan
+    return found
+
+
+def _closed_form() -> Callable[..., np.ndarray]:
+    try:
+        from frankik import ik_full
+    except ImportError as error:
+        raise MissingExtraError(
+            "inverse kinematics of the arm need frankik: pip install 'ffhnet[arm]'"
+        ) from error
+    return ik_full
