@@ -66,11 +66,11 @@ def data_card(folders: Sequence[Path], commands: Sequence[str] = ()) -> str:
 def _introduction(parts: Sequence[_Part]) -> str:
     hands = ", ".join(sorted({part.header["hand"] for part in parts}))
     return (
-        f"Simulated grasp trials of the hand `{hands}` on objects resting on a table, with views. "
-        "The columns\nare described in [docs/data.md](../docs/data.md). Licence: Apache-2.0, like the code.\n\n"
-        "`ffhnet data card` wrote this page; every number is counted in the files. Success is the share of "
-        "executed trials,\nwith the 95 % Wilson interval as if trials were independent; trials of one object are "
-        "not, so the true uncertainty\nis larger. Start collisions are no executed trials.\n"
+        f"Simulated grasp trials of the hand `{hands}` on objects resting on a table, with views.\n"
+        "Columns are described in [docs/data.md](../docs/data.md). Licence: Apache-2.0, like the code.\n\n"
+        "`ffhnet data card` wrote this page; every number is counted in the files. Success is the share of\n"
+        "executed trials, with the 95 % Wilson interval as if trials were independent; trials of one object\n"
+        "are not, so the true uncertainty is larger. Start collisions are no executed trials.\n"
     )
 
 
@@ -89,16 +89,8 @@ def _contents(parts: Sequence[_Part]) -> str:
         )
         for part in parts
     ]
-    columns = (
-        "folder",
-        "split",
-        "objects",
-        "placements",
-        "views",
-        "executed",
-        "successes",
-        "start collisions",
-    )
+    counted = ("objects", "object seeds", "placements", "views", "executed", "successes", "start collisions")
+    columns = ("folder", "split", *counted)
     return "## Contents\n\n" + _table(columns, rows)
 
 

@@ -245,5 +245,7 @@ def _check(grasps: ObjectGrasps, path: Path) -> None:
     if len(lengths) > 1:
         raise DatasetError(f"{path}: wanted as many values as transforms everywhere, got {lengths}")
     square = np.swapaxes(T[:, :3, :3], 1, 2) @ T[:, :3, :3]
+    if not np.isfinite(T).all():
+        raise DatasetError(f"{path}: a transform is not finite")
     if not (np.allclose(square, np.eye(3), atol=1e-3) and np.allclose(T[:, 3], [0, 0, 0, 1], atol=1e-6)):
         raise DatasetError(f"{path}: a transform is not rigid")

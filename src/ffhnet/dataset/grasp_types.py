@@ -41,11 +41,8 @@ class GraspTypes:
         return self.kind << len(self.fingers) | self.takes_part @ bits
 
     def label(self, index: int) -> str:
-        """For example "power, thumb + index, middle"."""
-        names = [name for name, part in zip(self.fingers, self.takes_part[index], strict=True) if part]
-        others = [name for name in names if name != "thumb"]
-        thumb = ["thumb"] if "thumb" in names else []
-        return f"{KINDS[self.kind[index]]}, " + " + ".join([*thumb, ", ".join(others)] if others else thumb)
+        """For example "power, 4 fingers"."""
+        return f"{KINDS[self.kind[index]]}, {self.takes_part[index].sum()} fingers"
 
 
 def grasp_types(
