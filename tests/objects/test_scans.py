@@ -7,7 +7,7 @@ import trimesh
 from ffhnet.errors import InputFileError, MissingExtraError, ObjectError
 from ffhnet.objects import decompose
 from ffhnet.objects.inertia import inertia
-from ffhnet.objects.scans import find_meshes, load_folder, load_scan
+from ffhnet.objects.scans import load_scan
 
 KIT_TEST = Path(__file__).parents[2] / "../shared/data/meshes/kit_test"
 
@@ -137,8 +137,9 @@ def with_nan() -> str:
     ("mesh", "message"),
     [
         (half_open(), "closed mesh"),
-        (box(30), "millimetres"),
-        (box(1e-3), "another unit"),
+        (box(30), "centimetres, give --scale 0.01"),
+        (box(1e-3), "in which unit"),
+        (box(9000), "in which unit"),
         (trimesh.creation.box(extents=[0.1, 0.1, 1e-5]), "in every direction"),
     ],
 )
@@ -148,7 +149,7 @@ def test_unusable_meshes_say_why(tmp_path, mesh, message):
 
 
 def test_too_many_faces_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("ffhnet.objects.scans.MAX_FACES", 10)
+    monkeypatch.setattr("ffhnet.objects.mesh_files.MAX_FACES", 10)
     with pytest.raises(ObjectError, match="at most 10 faces"):
         load_scan(write(box(), tmp_path / "box.obj"))
 
@@ -172,39 +173,9 @@ def test_broken_files_raise_typed_errors(tmp_path, name, content, error):
         load_scan(path)
 
 
-def test_absent_files_and_folders_raise_typed_errors(tmp_path):
+def test_an_absent_file_raises_a_typed_error(tmp_path):
     with pytest.raises(InputFileError, match="there is none"):
         load_scan(tmp_path / "none.obj")
-    with pytest.raises(InputFileError, match="there is none"):
-        find_meshes(tmp_path / "none")
-    with pytest.raises(InputFileError, match="found none"):
-        find_meshes(tmp_path)
-
-
-def test_a_folder_reports_errors_and_goes_on(tmp_path):
-    write(box(), tmp_path / "a.obj")
-    (tmp_path / "b.obj").write_text("nonsense")
-    write(box(), tmp_path / "c.ply")
-    results = list(load_folder(tmp_path))
-    assert [result.path.name for result in results] == ["a.obj", "b.obj", "c.ply"]
-    assert [result.obj is None for result in results] == [False, True, False]
-    assert [result.error is None for result in results] == [True, False, True]
-
-
-def test_the_layouts_of_known_data_sets_give_one_object_per_folder(tmp_path):
-    for inner in ("google_16k/nontextured.ply", "google_16k/textured.obj", "poisson/nontextured.ply"):
-        write(box(), tmp_path / "003_cracker_box" / inner)
-    write(box(), tmp_path / "Mug" / "meshes" / "model.obj")
-    write(trimesh.creation.icosphere(radius=0.03), tmp_path / "other" / "a_large.obj")
-    write(box(), tmp_path / "other" / "b_small.obj")
-    write(box(), tmp_path / "single.obj")
-    found = {name: path.relative_to(tmp_path).as_posix() for name, path in find_meshes(tmp_path)}
-    assert found == {
-        "003_cracker_box": "003_cracker_box/google_16k/nontextured.ply",
-        "Mug": "Mug/meshes/model.obj",
-        "other": "other/b_small.obj",
-        "single": "single.obj",
-    }
 
 
 @pytest.mark.skipif(not KIT_TEST.is_dir(), reason="the shared KIT meshes (../shared/data) are not here")

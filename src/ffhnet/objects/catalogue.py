@@ -10,8 +10,9 @@ from typing import cast
 
 from ffhnet.errors import ObjectError
 from ffhnet.objects.grasp_object import GraspObject
+from ffhnet.objects.layouts import find_meshes
 from ffhnet.objects.procedural import FIRST_SEED, Split, make_object, object_name, procedural_split, seed_of
-from ffhnet.objects.scans import find_meshes, load_scan
+from ffhnet.objects.scans import load_scan
 
 DEFAULT_COUNT = 100
 """Objects of a procedural split where the user names no number."""
@@ -47,7 +48,7 @@ def resolve_objects(spec: str, cache_dir: str | Path | None = None) -> list[Obje
     path = Path(spec)
     # The path of an empty text is the working folder.
     if spec and path.is_dir():
-        return [_scan(name, file, cache_dir) for name, file in find_meshes(path)]
+        return [_scan(mesh.name, mesh.path, cache_dir) for mesh in find_meshes(path)]
     if path.is_file():
         return [_scan(path.stem, path, cache_dir)]
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import tempfile
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from scipy.spatial import QhullError
 
 from ffhnet.errors import MissingExtraError, ObjectError
 from ffhnet.objects.convex import convex_hull
@@ -82,10 +84,14 @@ def _decompose(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, ...]:
         ) from None
     coacd.set_log_level("error")
     parts = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.faces), **PARAMETERS)
-    pieces = tuple(convex_hull(np.asarray(vertices, dtype=float)) for vertices, _ in parts)
+    pieces = []
+    for vertices, _ in parts:
+        # Now and then a part is flat, which adds nothing to the shape.
+        with contextlib.suppress(QhullError):
+            pieces.append(convex_hull(np.asarray(vertices, dtype=float)))
     if not pieces:
         raise ObjectError(f"wanted convex pieces of a mesh of {len(mesh.faces)} faces, CoACD found none")
-    return pieces
+    return tuple(pieces)
 
 
 def _read(path: Path) -> tuple[trimesh.Trimesh, ...] | None:
