@@ -26,7 +26,7 @@ from ffhnet.perception.raycast import RayScene
 
 IMAGES = Path(__file__).parent / "images"
 COLUMNS = 6
-PANEL = 216
+PANEL = 200
 FINE = 2
 """The plot is drawn so many times larger and then reduced: Pillow draws hard edges."""
 
@@ -136,7 +136,7 @@ def diversity_picture(trials: TrialColumns, hand: Hand, rng: np.random.Generator
         lines = f"{rate.value:.0%} of {rate.trials}\nexecuted trials\nsucceed"
         draw.multiline_text((16, top + 36), lines, FAINT, font(16), spacing=5)
         good = shown(part, rng)
-        types = grasp_types(good.closed_joints, good.contact_links, hand)
+        types = grasp_types(good.closed_joints, np.nan_to_num(good.contact_links), hand)
         for column, index in enumerate(varied(good, COLUMNS)):
             left = label + column * (PANEL + gap)
             canvas.paste(grasp_panel(good, index, hand), (left, top))
@@ -245,8 +245,8 @@ def draw_objects(draw: ImageDraw.ImageDraw, trials: TrialColumns, box: tuple[int
 
 
 def save(picture: Image.Image, name: str) -> None:
-    """Keeps 256 colours, a third of the bytes; nobody sees the difference."""
-    save_png(picture.quantize(256), IMAGES / name)
+    """Keeps 160 colours, a quarter of the bytes; nobody sees the difference."""
+    save_png(picture.quantize(160), IMAGES / name)
     print(f"{name}: {(IMAGES / name).stat().st_size / 1000:.0f} kB")
 
 
