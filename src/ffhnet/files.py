@@ -1,10 +1,13 @@
-"""Writing files whole or not at all."""
+"""Writing files whole or not at all, and folders by one process at a time."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TextIO
 
 from ffhnet.errors import OptionError
 
@@ -22,7 +25,9 @@ def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
 
 
 def write_atomically(path: str | Path, data: bytes) -> None:
-    """Write a file so that nobody ever sees half of it: beside its place first, then moved.
+    """Write a file so that nobody ever sees half of it, not even after a power cut.
+
+    It is written beside its place first, under a hidden name, and moved when it is on the disk.
 
     Raises:
         OptionError: the file cannot be written.
@@ -33,6 +38,8 @@ def write_atomically(path: str | Path, data: bytes) -> None:
         try:
             with os.fdopen(descriptor, "wb") as file:
                 file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
             # mkstemp makes files private; a result should be as readable as any other new file.
             mask = os.umask(0)
             os.umask(mask)
@@ -43,3 +50,40 @@ def write_atomically(path: str | Path, data: bytes) -> None:
             raise
     except OSError as error:
         raise OptionError(f"{path}: cannot write: {error.strerror}") from error
+
+
+def remove_unfinished(folder: Path, suffix: str) -> None:
+    """Removes what `write_atomically` left of files with this suffix when its process was killed.
+
+    Nobody else may be writing there, see `only_writer`.
+    """
+    for file in folder.glob(f".*{suffix}.????????"):
+        file.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def only_writer(folder: Path) -> Iterator[bool]:
+    """Holds the lock of a folder, a file in it; gives whether it could be held.
+
+    The operating system takes the lock back when the process ends, however it ends: it is never stale. Some
+    systems (Windows) and file systems have no such locks.
+
+    Raises:
+        BlockingIOError: another process holds it.
+    """
+    with (folder / ".lock").open("w") as file:
+        yield _lock(file)
+
+
+def _lock(file: TextIO) -> bool:
+    try:
+        import fcntl
+    except ImportError:
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise
+    except OSError:
+        return False
+    return True

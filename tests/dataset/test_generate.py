@@ -1,15 +1,11 @@
-"""The generation job on two small objects: what is written, determinism, resumption after a kill."""
+"""The generation job on two small objects: what is written, and that labels and frames are right."""
 
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
 
+from ffhnet.dataset.executors import LocalExecutor
 from ffhnet.dataset.generate import generate
 from ffhnet.dataset.object_trials import GenerateConfig
 from ffhnet.dataset.records import pack, read_header, read_tables, read_training_data
@@ -27,7 +23,7 @@ SMALL = GenerateConfig(
 
 def run(out, workers=1, sources=SOURCES[:2]):
     done = []
-    generate(sources, out, SMALL, workers, done.append)
+    assert generate(sources, out, SMALL, LocalExecutor(workers), done.append, print) == {}
     return done
 
 
@@ -73,7 +69,7 @@ def test_finished_objects_are_left_alone(data_set):
 
 def test_other_settings_are_refused(data_set):
     with pytest.raises(DatasetError, match="other settings"):
-        generate(SOURCES[:1], data_set, GenerateConfig(), 1, print)
+        generate(SOURCES[:1], data_set, GenerateConfig(), LocalExecutor(1), print, print)
 
 
 def test_stored_labels_come_again_from_physics(data_set):
@@ -118,29 +114,6 @@ def test_pack_keeps_everything(data_set, tmp_path):
     np.testing.assert_array_equal(packed.position, loose.position)
     np.testing.assert_array_equal(packed.bps, loose.bps)
     assert summarise(tmp_path / "packed").rows == summarise(data_set).rows
-
-
-def test_a_killed_job_goes_on_and_ends_with_the_same_files(data_set, tmp_path):
-    out = tmp_path / "killed"
-    script = (
-        "from pathlib import Path\n"
-        "from ffhnet.dataset.generate import generate\n"
-        "from ffhnet.dataset.object_trials import GenerateConfig\n"
-        "from ffhnet.objects.catalogue import resolve_objects\n"
-        "if __name__ == '__main__':\n"
-        f"    generate(resolve_objects('procedural-test:2'), Path({str(out)!r}), {SMALL!r}, 1, print)\n"
-    )
-    program = tmp_path / "job.py"
-    program.write_text("from ffhnet.simulation.physics import Physics\n" + script, encoding="utf-8")
-    job = subprocess.Popen([sys.executable, str(program)], start_new_session=True)
-    deadline = time.monotonic() + 120
-    while not list(out.glob("trials/[!.]*.parquet")) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    os.killpg(job.pid, signal.SIGKILL)
-    job.wait()
-    assert len(contents(out)) < 4
-    run(out)
-    assert contents(out) == contents(data_set)
 
 
 def test_damaged_data_sets_are_named(tmp_path):

@@ -3,32 +3,41 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+import sys
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
 from ffhnet.apps.console import absent, print_table, progress_bar
 from ffhnet.apps.extras import require_sim
-from ffhnet.errors import OptionError
+from ffhnet.errors import DatasetError, OptionError
+
+if TYPE_CHECKING:
+    from ffhnet.dataset.executors import Executor
+    from ffhnet.objects.catalogue import ObjectSource
+
+DEFAULT_COUNT = 400
 
 
 @dataclass(frozen=True)
 class GenerateOptions:
-    """Try grasps on procedural objects in physics and store them as Parquet files.
+    """Try grasps on objects in physics and store them as Parquet files.
 
     A job that was stopped goes on where it was when the same command is given again.
     """
 
     out: Annotated[Path, tyro.conf.Positional]
     """Folder of the data set."""
-    split: Literal["train", "val", "test"] = "train"
-    """Split of procedural objects."""
-    count: int = 400
-    """Number of objects."""
+    objects: Annotated[str | None, absent("SPEC")] = None
+    """A folder of meshes, a mesh file, procedural-train:N, or the name of one object."""
+    split: Annotated[Literal["train", "val", "test"] | None, absent("{train,val,test}", "train")] = None
+    """Split of procedural objects, without --objects."""
+    count: Annotated[int | None, absent("N", f"{DEFAULT_COUNT} of a split, all of --objects")] = None
+    """Number of objects, at most."""
     first: int = 0
-    """Leave out this many objects of the split; for fresh objects in later rounds."""
+    """Leave out this many objects before; for fresh objects in later rounds."""
     seed: int = 0
     """Seed of all randomness, together with the object's own."""
     placements: int = 2
@@ -45,22 +54,25 @@ class GenerateOptions:
     """Weights whose generator proposes grasps too."""
     learned: int = 0
     """Executed trials per placement of that generator."""
-    workers: int = field(default_factory=lambda: os.cpu_count() or 1)
-    """Processes."""
+    executor: Literal["local", "ray"] = "local"
+    """Where to work: processes of this machine, or a Ray cluster."""
+    address: Annotated[str | None, absent("ADDR", "this machine's cluster, else a new one")] = None
+    """Ray cluster: auto, HOST:PORT or ray://HOST:PORT."""
+    workers: Annotated[int | None, absent("N", "all cores")] = None
+    """Processes; with ray, objects in work at a time."""
 
 
 def run(options: GenerateOptions) -> None:
-    """Generate, then print what the data set holds."""
+    """Generate, then print what the data set holds and which objects failed."""
     require_sim("generate")
-    from ffhnet.dataset.generate import generate
+    executor = _executor(options)
+    sources = _sources(options)
+    weights = _checked_weights(options)
+    # After the options are checked: these load MuJoCo and torch.
+    from ffhnet.dataset.generate import generate, unfinished
     from ffhnet.dataset.object_trials import GenerateConfig
     from ffhnet.dataset.statistics import summarise
-    from ffhnet.objects.catalogue import resolve_objects
 
-    if options.count < 1 or options.first < 0 or options.workers < 1:
-        raise OptionError("--count and --workers must be at least 1, --first at least 0")
-    if (options.weights is None) != (options.learned == 0):
-        raise OptionError("--weights and --learned go together: give both, or neither")
     config = GenerateConfig(
         seed=options.seed,
         placements=options.placements,
@@ -69,10 +81,65 @@ def run(options: GenerateOptions) -> None:
         power=options.power,
         perturb=options.perturb,
         learned=options.learned,
-        weights=None if options.weights is None else str(options.weights),
+        weights=weights,
     )
-    sources = resolve_objects(f"procedural-{options.split}:{options.first + options.count}")[options.first :]
-    with progress_bar("objects", len(sources)) as step:
-        generate(sources, options.out, config, options.workers, lambda _: step())
+    with progress_bar("objects", len(unfinished(sources, options.out))) as step:
+
+        def failed(name: str, reason: str) -> None:
+            print(f"failed: {name}: {reason}", file=sys.stderr)
+            step()
+
+        failures = generate(sources, options.out, config, executor, lambda _: step(), failed)
+    if failures:
+        print(f"Objects that failed, also in {options.out / 'failed.json'}: {len(failures)}", file=sys.stderr)
+        for name, reason in failures.items():
+            print(f"  {name}: {reason}", file=sys.stderr)
+    if len(unfinished(sources, options.out)) == len(sources):
+        raise DatasetError(f"none of the {len(sources)} objects could be used")
     summary = summarise(options.out)
     print_table(summary.title, summary.columns, summary.rows)
+
+
+def _executor(options: GenerateOptions) -> Executor:
+    from ffhnet.dataset.executors import LocalExecutor, RayExecutor
+
+    if options.workers is not None and options.workers < 1:
+        raise OptionError(f"--workers must be at least 1, got {options.workers}")
+    if options.executor == "ray":
+        return RayExecutor(options.address, options.workers)
+    if options.address is not None:
+        raise OptionError("--address is the address of a Ray cluster: it goes with --executor ray")
+    return LocalExecutor(options.workers or os.cpu_count() or 1)
+
+
+def _sources(options: GenerateOptions) -> list[ObjectSource]:
+    from ffhnet.objects.catalogue import resolve_objects
+
+    first, count = options.first, options.count
+    if first < 0 or (count is not None and count < 1):
+        raise OptionError("--count must be at least 1, --first at least 0")
+    if options.objects is None:
+        count = DEFAULT_COUNT if count is None else count
+        return resolve_objects(f"procedural-{options.split or 'train'}:{first + count}")[first:]
+    if options.split is not None:
+        raise OptionError("--objects and --split both name objects: give one of them")
+    # Workers of a cluster have other working folders.
+    is_file = options.objects and Path(options.objects).exists()
+    found = resolve_objects(str(Path(options.objects).absolute()) if is_file else options.objects)
+    sources = found[first:] if count is None else found[first : first + count]
+    if not sources:
+        raise OptionError(f"--first {first} leaves out all {len(found)} objects of {options.objects}")
+    return sources
+
+
+def _checked_weights(options: GenerateOptions) -> str | None:
+    """The folder of weights, tried here once rather than by every object."""
+    if (options.weights is None) != (options.learned == 0):
+        raise OptionError("--weights and --learned go together: give both, or neither")
+    if options.weights is None:
+        return None
+    from ffhnet.hands import DEFAULT_HAND
+    from ffhnet.inference.ffhnet import FFHNet
+
+    FFHNet.from_pretrained(options.weights, hand=DEFAULT_HAND, device="cpu")
+    return str(options.weights)
