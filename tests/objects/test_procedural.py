@@ -64,7 +64,7 @@ def test_every_family_is_reached_about_as_often_as_its_weight_says(objects):
 
 
 def test_pieces_are_closed_convex_and_outward(objects):
-    for obj in objects[:150]:
+    for obj in objects[:80]:
         for piece in obj.pieces:
             assert piece.is_watertight, obj.name
             assert piece.is_winding_consistent, obj.name
@@ -177,7 +177,7 @@ def test_negative_seeds_are_refused():
 
 def test_making_an_object_is_quick():
     times = []
-    for seed in range(40):
+    for seed in range(15):
         start = time.process_time()
         make_object(seed)
         times.append(time.process_time() - start)

@@ -30,8 +30,8 @@ class HandLimits:
 
     Attributes:
         opening: m between thumb and fingers when open.
-        finger_radius: m; a grip is at least so far above the table.
-        min_height: m of an object that fingers can get hold of beside the table.
+        finger_radius: m; a grip is at least so far above the table, and no object lower than a finger is
+            thick can be gripped from its sides.
         max_slope: sine of the angle to the horizontal at which thumb and fingers still oppose each other.
         min_area: m² of surface, both sides of the grip together: the pads of two fingers and the thumb.
         max_mass: kg that fingertip forces of 10 N hold by friction, with a reserve for the lift.
@@ -39,7 +39,6 @@ class HandLimits:
 
     opening: float = 0.095
     finger_radius: float = 0.009
-    min_height: float = 0.02
     max_slope: float = 0.7
     min_area: float = 5e-4
     max_mass: float = 1.0
@@ -71,7 +70,7 @@ def why_not_graspable(obj: GraspObject, limits: HandLimits = DLR_HIT_II) -> str 
         return f"too heavy: {1000 * obj.mass:.0f} g, the hand holds {1000 * limits.max_mass:.0f} g"
     vertices = np.concatenate([piece.vertices for piece in obj.pieces])
     heights = [float(np.ptp(vertices @ pose[2, :3])) for pose in obj.resting_poses]
-    if max(heights) < limits.min_height:
+    if max(heights) < 2 * limits.finger_radius:
         return f"too flat: at most {1000 * max(heights):.0f} mm above the table"
     grips = find_grips(obj.pieces)
     widths = [_narrowest(grips, pose, limits) for pose in obj.resting_poses]
