@@ -37,8 +37,8 @@ def test_pieces_are_closed_and_outward(every):
 
 
 def test_nothing_is_thinner_than_the_simulated_fingers_can_hold(every):
-    for obj in every:
-        grips = find_grips(obj.pieces)
+    for obj in every[::2]:
+        grips = find_grips(obj.pieces, count=800)
         thin = np.percentile(grips.widths, 25 if obj.family in EDGED else 5)
         assert thin > (0.0045 if obj.family in WALLED else MIN_THICKNESS - 1e-6), obj.name
 
