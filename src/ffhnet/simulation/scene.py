@@ -6,6 +6,7 @@ and needs no moving base: a mocap body has no velocity, so a lifted mocap hand w
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import mujoco
@@ -28,9 +29,11 @@ class Scene:
         follower_qpos, leader_joint: qpos index of each coupled joint and the column of its leader.
         actuators: ctrl index of each actuated joint, in the hand's order.
         object_qpos: qpos index of the object's free joint.
-        geom_owner: for each geom TABLE, OBJECT or HAND.
+        geom_owner: for each geom TABLE, OBJECT, HAND or ARM.
         hand_mocap, table_mocap: mocap indices.
         object_body: body id of the object.
+
+    The object's indices are -1 in a scene without one, the hand's mocap index is -1 where an arm carries it.
     """
 
     hand: Hand
@@ -70,13 +73,32 @@ class Scene:
         return float(self.data.mocap_pos[self.table_mocap, 2])
 
 
-TABLE, OBJECT, HAND = 0, 1, 2
+TABLE, OBJECT, HAND, ARM = 0, 1, 2, 3
+MOUNT = "hand"
+"""Name of the body that the hand's root sits on."""
 PREFIX = "hand/"
 """Before the names of the hand's joints and bodies in a scene."""
 
 
-def build_scene(hand: Hand, obj: GraspObject, physics: Physics | None = None) -> Scene:
-    """Compiles the scene of one hand and one object."""
+def floating_mount(spec: mujoco.MjSpec) -> mujoco.MjsBody:
+    """Adds a body that stands where it is placed, for the hand to sit on."""
+    return spec.worldbody.add_body(name=MOUNT, mocap=True)
+
+
+def build_scene(
+    hand: Hand,
+    obj: GraspObject | None,
+    physics: Physics | None = None,
+    add_mount: Callable[[mujoco.MjSpec], mujoco.MjsBody] = floating_mount,
+) -> Scene:
+    """Compiles the scene of one hand and one object, or of the hand alone.
+
+    Args:
+        hand: the hand.
+        obj: the object, or None.
+        physics: constants.
+        add_mount: adds what carries the hand and returns the body named `MOUNT` that the hand's root sits on.
+    """
     physics = physics or Physics()
     spec = mujoco.MjSpec()
     _set_options(spec, physics)
@@ -84,6 +106,22 @@ def build_scene(hand: Hand, obj: GraspObject, physics: Physics | None = None) ->
     table = spec.worldbody.add_body(name="table", mocap=True)
     table.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.0, 1.0, 0.1])
 
+    if obj is not None:
+        _add_object(spec, obj)
+    hand_spec = mujoco.MjSpec.from_file(str(hand.mjcf))
+    add_mount(spec).add_frame().attach_body(hand_spec.worldbody.first_body(), PREFIX, "")
+    for geom in spec.geoms:
+        geom.friction = physics.friction
+        geom.solref = [physics.contact_time_constant, 1.0]
+        geom.condim = 4
+    for equality in spec.equalities:
+        equality.solref = [physics.contact_time_constant, 1.0]
+        equality.solimp[:3] = [0.95, 0.99, 0.001]
+    model = spec.compile()
+    return _index(hand, physics, model)
+
+
+def _add_object(spec: mujoco.MjSpec, obj: GraspObject) -> None:
     body = spec.worldbody.add_body(name="object")
     body.add_freejoint()
     density = obj.mass / sum(piece.volume for piece in obj.pieces)
@@ -94,19 +132,6 @@ def build_scene(hand: Hand, obj: GraspObject, physics: Physics | None = None) ->
         body.add_geom(
             name=f"piece_{i}", type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"piece_{i}", density=density
         )
-
-    mount = spec.worldbody.add_body(name="hand", mocap=True)
-    hand_spec = mujoco.MjSpec.from_file(str(hand.mjcf))
-    mount.add_frame().attach_body(hand_spec.worldbody.first_body(), PREFIX, "")
-    for geom in spec.geoms:
-        geom.friction = physics.friction
-        geom.solref = [physics.contact_time_constant, 1.0]
-        geom.condim = 4
-    for equality in spec.equalities:
-        equality.solref = [physics.contact_time_constant, 1.0]
-        equality.solimp[:3] = [0.95, 0.99, 0.001]
-    model = spec.compile()
-    return _index(hand, physics, model)
 
 
 def _set_options(spec: mujoco.MjSpec, physics: Physics) -> None:
@@ -125,10 +150,8 @@ def _set_options(spec: mujoco.MjSpec, physics: Physics) -> None:
 
 
 def _index(hand: Hand, physics: Physics, model: mujoco.MjModel) -> Scene:
-    hand_body = model.body("hand").id
-    object_body = model.body("object").id
-    root = model.body_rootid[model.geom_bodyid]
-    owner = np.where(root == hand_body, HAND, np.where(root == object_body, OBJECT, TABLE))
+    hand_body = model.body(MOUNT).id
+    object_body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "object")
     couplings = hand.tree.couplings
     return Scene(
         hand=hand,
@@ -139,9 +162,18 @@ def _index(hand: Hand, physics: Physics, model: mujoco.MjModel) -> Scene:
         follower_qpos=np.array([model.joint(PREFIX + c.follower).qposadr[0] for c in couplings], dtype=int),
         leader_joint=np.array([hand.joint_names.index(c.leader) for c in couplings], dtype=int),
         actuators=np.array([model.actuator(PREFIX + name).id for name in hand.joint_names]),
-        object_qpos=int(model.jnt_qposadr[model.body_jntadr[object_body]]),
-        geom_owner=owner,
+        object_qpos=int(model.jnt_qposadr[model.body_jntadr[object_body]]) if object_body >= 0 else -1,
+        geom_owner=_body_owners(model)[model.geom_bodyid],
         hand_mocap=int(model.body_mocapid[hand_body]),
         table_mocap=int(model.body_mocapid[model.body("table").id]),
         object_body=object_body,
     )
+
+
+def _body_owners(model: mujoco.MjModel) -> Int[np.ndarray, " B"]:
+    """Every body belongs to what the nearest named ancestor is; what carries the hand is the arm."""
+    named = {"table": TABLE, "object": OBJECT, MOUNT: HAND}
+    owner = np.full(model.nbody, ARM)
+    for body in range(1, model.nbody):
+        owner[body] = named.get(model.body(body).name, owner[model.body_parentid[body]])
+    return owner

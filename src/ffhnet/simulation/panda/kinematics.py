@@ -71,7 +71,12 @@ def pose_error(
     q: Float[np.ndarray, "*batch 7"], T_base_flange: Float[np.ndarray, "*batch 4 4"]
 ) -> Float[np.ndarray, "*batch 6"]:
     """From the flange to where it should be: position (m), small rotation vector (rad), base frame."""
-    T_base_now = forward(q)
+    return _pose_error(forward(q), T_base_flange)
+
+
+def _pose_error(
+    T_base_now: Float[np.ndarray, "*batch 4 4"], T_base_flange: Float[np.ndarray, "*batch 4 4"]
+) -> Float[np.ndarray, "*batch 6"]:
     # Half the sum of the crossed axes is the rotation vector times sin(angle) / angle.
     now, wanted = T_base_now[..., :3, :3].swapaxes(-1, -2), T_base_flange[..., :3, :3].swapaxes(-1, -2)
     turn = _cross(now, wanted).sum(axis=-2) / 2
@@ -96,7 +101,12 @@ def least_motion(
         q: joint angles, rad.
         twist: position (m) and rotation vector (rad) in the base frame.
     """
-    frames = joint_frames(q)
+    return _least_motion(joint_frames(q), twist)
+
+
+def _least_motion(
+    frames: Float[np.ndarray, "*batch 8 4 4"], twist: Float[np.ndarray, "*batch 6"]
+) -> Float[np.ndarray, "*batch 7"]:
     axes = frames[..., :7, :3, 2]
     arm = frames[..., 7, None, :3, 3] - frames[..., :7, :3, 3]
     transposed = np.concatenate([_cross(axes, arm), axes], axis=-1)
@@ -109,7 +119,8 @@ def refine(
 ) -> Float[np.ndarray, "*batch 7"]:
     """Joint angles moved to the pose by damped Newton steps, which stay on the branch of a start near by."""
     for _ in range(steps):
-        q = q + least_motion(q, pose_error(q, T_base_flange))
+        frames = joint_frames(q)
+        q = q + _least_motion(frames, _pose_error(frames[..., 7, :, :], T_base_flange))
     return q
 
 
