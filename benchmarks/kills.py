@@ -66,12 +66,13 @@ def main(options: Options) -> None:
                         break
                     except subprocess.TimeoutExpired:
                         workers = _workers(driver.pid)
-                    if not workers or chance.random() < 0.5:
+                    victim = chance.choice([driver.pid, *workers])
+                    if victim == driver.pid:
                         driver.kill()
                         killed["driver"] += 1
                         longest_orphan = max(longest_orphan, _seconds_until_gone(workers))
                         break
-                    _kill(chance.choice(workers))
+                    _kill(victim)
                     killed["worker"] += 1
                 driver.wait()
             same = same and _contents(out) == expected

@@ -1,4 +1,4 @@
-"""Cheap units of work for the tests of executors; importable by worker processes."""
+"""Cheap units of work for worker processes, and an executor that needs none."""
 
 import os
 import signal
@@ -6,6 +6,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from ffhnet.dataset.executors.base import attempt
 from ffhnet.errors import ObjectError
 
 
@@ -30,21 +31,32 @@ class Task:
     notes: Path
     seconds: float = 0.0
     deaths: int = 0
+    gate: Path | None = None
 
     def starts(self):
         return sorted(int(path.name.split("-")[1]) for path in self.notes.glob(f"{self.number}-*-*"))
 
 
 def noted_square(task):
-    """Kills its own process in its first `deaths` starts."""
+    """Kills its own process in its first `deaths` starts; then waits for its gate to be there."""
     start = len(task.starts())
     (task.notes / f"{task.number}-{os.getpid()}-{start}").touch()
     if start < task.deaths:
         os.kill(os.getpid(), signal.SIGKILL)
     time.sleep(task.seconds)
+    while task.gate is not None and not task.gate.exists():
+        time.sleep(0.02)
     return square(task.number)
 
 
 def process_id(number):
     time.sleep(0.01)
     return os.getpid()
+
+
+class HereExecutor:
+    """Runs units in this process, where starting others would add nothing to a test."""
+
+    def run(self, work, jobs, on_result, on_error):
+        for job in jobs:
+            attempt(work, job).report(job, on_result, on_error)

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -144,19 +145,22 @@ def test_local_workers_end_when_their_parent_is_killed(tmp_path):
 def test_units_of_a_lost_ray_node_run_elsewhere(cluster, tmp_path):
     node = cluster.add_node(num_cpus=1)
     cluster.wait_for_nodes()
-    jobs = [work.Task(n, tmp_path, seconds=1.0) for n in range(9)]
-    executor, seen = RayExecutor(cluster.address), []
+    gate = tmp_path / "gate"
+    jobs = [work.Task(n, tmp_path, gate=gate) for n in range(9)]
 
-    def on_result(job, result):
-        assert result == job.number**2
-        if not seen:
-            # All three nodes are in the middle of a unit.
-            cluster.remove_node(node, allow_graceful=False)
-        seen.append(job.number)
+    def lose_the_node():
+        # With three units at work each node has one, as each has one CPU.
+        wait_for(lambda: len(list(tmp_path.glob("*-*-*"))) == 3)
+        cluster.remove_node(node, allow_graceful=False)
+        gate.touch()
 
-    executor.run(work.noted_square, jobs, on_result, lambda job, error: pytest.fail(str(error)))
-    assert sorted(seen) == list(range(9))
-    assert sum(len(job.starts()) for job in jobs) > len(jobs), "no unit was on the node that was removed"
+    loss = threading.Thread(target=lose_the_node)
+    loss.start()
+    results, errors = collect(RayExecutor(cluster.address), work.noted_square, jobs)
+    loss.join()
+    assert results == {job: job.number**2 for job in jobs}
+    assert errors == {}
+    assert sorted(len(job.starts()) for job in jobs) == [1] * 8 + [2]
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1:9", "ray://127.0.0.1:9", "nonsense"])

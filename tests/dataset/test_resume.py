@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from executor_work import HereExecutor
 
+from ffhnet.apps.cli import main
 from ffhnet.dataset.executors import LocalExecutor, RayExecutor
-from ffhnet.dataset.executors.base import attempt
 from ffhnet.dataset.generate import generate, unfinished
 from ffhnet.dataset.object_trials import GenerateConfig
 from ffhnet.errors import DatasetError, OptionError
@@ -22,14 +23,6 @@ from ffhnet.objects.catalogue import resolve_objects
 SOURCES = resolve_objects("procedural-test:3")
 SMALL = GenerateConfig(placements=1, views=1, heuristic=2, power=2, perturb_rounds=0, max_collisions=2)
 REPOSITORY = Path(__file__).parents[2]
-
-
-class HereExecutor:
-    """Runs units in this process: what is tested is what the job does with their results."""
-
-    def run(self, work, jobs, on_result, on_error):
-        for job in jobs:
-            attempt(work, job).report(job, on_result, on_error)
 
 
 def run(out, sources=SOURCES, executor=None):
@@ -169,3 +162,52 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
         write_atomically(path, np.random.default_rng(0).bytes(1000))
     assert path.read_bytes() == b"old"
     assert os.listdir(tmp_path) == ["file.bin"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--workers", "0"], "--workers must be at least 1, got 0"),
+        (["--count", "0"], "--count must be at least 1"),
+        (["--first", "-1"], "--first at least 0"),
+        (["--address", "auto"], "goes with --executor ray"),
+        (["--objects", "procedural-test:2", "--split", "val"], "--objects and --split both name objects"),
+        (["--objects", "procedural-test:2", "--first", "2"], "leaves out all 2 objects"),
+        (["--objects", "nonsense"], "got 'nonsense'"),
+        (["--learned", "5"], "--weights and --learned go together"),
+        (["--executor", "dask"], "dask"),
+    ],
+)
+def test_options_are_checked_before_anything_is_done(arguments, message, tmp_path, capsys):
+    status, error = command(tmp_path / "out", *arguments, capsys=capsys)
+    assert status == 2
+    assert message in error
+    assert len(error.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_command_names_broken_meshes_and_fails_where_there_are_no_others(
+    meshes, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr("ffhnet.dataset.executors.LocalExecutor", lambda workers: HereExecutor())
+    few = ["--placements", "1", "--views", "1", "--heuristic", "2", "--power", "0", "--perturb", "0"]
+    status, error = command(
+        tmp_path / "out", "--objects", meshes, "--first", "1", "--count", "2", *few, capsys=capsys
+    )
+    assert status == 0
+    assert len([line for line in error.splitlines() if line.startswith("failed: cut: ")]) == 1
+    assert [path.stem for path in (tmp_path / "out" / "trials").glob("*.parquet")] == ["can"]
+    status, error = command(tmp_path / "none", "--objects", meshes / "garbage.obj", capsys=capsys)
+    assert status == 2
+    assert "  garbage: wanted a mesh with faces" in error
+    assert error.splitlines()[-1] == "ffhnet: error: none of the 1 objects could be used"
+
+
+def command(*arguments, capsys):
+    """Exit status and standard error of `ffhnet generate`."""
+    status = 0
+    try:
+        main(["generate", *map(str, arguments)])
+    except SystemExit as stop:
+        status = stop.code
+    return status, capsys.readouterr().err
