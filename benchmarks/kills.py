@@ -74,7 +74,8 @@ def main(options: Options) -> None:
                         break
                     _kill(victim)
                     killed["worker"] += 1
-                driver.wait()
+                if driver.wait() > 0:
+                    sys.exit(f"a job that was not killed ended with status {driver.returncode}")
             same = same and _contents(out) == expected
         rows = {path.stem: pq.read_metadata(path).num_rows for path in undisturbed.glob("trials/*.parquet")}
     report = {

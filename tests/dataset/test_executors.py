@@ -15,6 +15,8 @@ from ffhnet.dataset.executors import LocalExecutor, RayExecutor, UnexpectedError
 from ffhnet.dataset.executors import local as local_module
 from ffhnet.errors import MissingExtraError, ObjectError, OptionError
 
+needs_proc = pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for processes in /proc")
+
 
 @pytest.fixture(params=["local", "ray"])
 def executor(request):
@@ -118,7 +120,7 @@ def test_run_jobs_stops_at_the_first_failure():
     assert done == [0]
 
 
-@pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for processes in /proc")
+@needs_proc
 def test_local_workers_end_when_their_parent_is_killed(tmp_path):
     """Also in the middle of a unit that would take a minute."""
     program = tmp_path / "driver.py"
@@ -142,6 +144,7 @@ def test_local_workers_end_when_their_parent_is_killed(tmp_path):
     assert len(list(tmp_path.glob("*-*-*"))) == 2
 
 
+@needs_proc
 def test_units_of_a_lost_ray_node_run_elsewhere(cluster, tmp_path):
     node = cluster.add_node(num_cpus=1)
     cluster.wait_for_nodes()
@@ -150,9 +153,13 @@ def test_units_of_a_lost_ray_node_run_elsewhere(cluster, tmp_path):
 
     def lose_the_node():
         # With three units at work each node has one, as each has one CPU.
-        wait_for(lambda: len(list(tmp_path.glob("*-*-*"))) == 3)
-        cluster.remove_node(node, allow_graceful=False)
-        gate.touch()
+        try:
+            wait_for(lambda: len(list(tmp_path.glob("*-*-*"))) == 3)
+            workers = [int(path.name.split("-")[1]) for path in tmp_path.glob("*-*-*")]
+            cluster.remove_node(node, allow_graceful=False)
+            wait_for(lambda: not all(alive(pid) for pid in workers))
+        finally:
+            gate.touch()
 
     loss = threading.Thread(target=lose_the_node)
     loss.start()
