@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -90,8 +90,8 @@ def main(options: Options) -> None:
         "objects": options.objects,
         "grasps": options.grasps,
         "seed": options.seed,
-        "lift_duration_floating_s": Physics().lift_duration,
         "lift_duration_arm_s": options.lift_duration,
+        "physics": asdict(Physics()),
     }
     if options.json is not None:
         options.json.write_text(json.dumps(report, indent=2) + "\n")
