@@ -87,17 +87,16 @@ class _Worker:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
         self.given = 0
-        self._process = context.Process(target=_serve, args=(theirs, work), daemon=True)
+        self._process = context.Process(target=_serve, args=(theirs,), daemon=True)
         self._process.start()
         # With the process's own end its last one, the pipe ends when the process dies.
         theirs.close()
+        self._send(work)
 
     def give(self, job: object) -> None:
         """Sends a unit."""
         self.given += 1
-        # Where the process has died, `take` will say so.
-        with contextlib.suppress(BrokenPipeError):
-            self.connection.send(job)
+        self._send(job)
 
     def take(self) -> Outcome | None:
         """How the unit ended, or None where the process died."""
@@ -105,6 +104,11 @@ class _Worker:
             return self.connection.recv()
         except (EOFError, OSError):
             return None
+
+    def _send(self, message: object) -> None:
+        # Where the process has died, `take` will say so.
+        with contextlib.suppress(ConnectionError):
+            self.connection.send(message)
 
     def cause_of_death(self) -> str:
         """What the operating system says about it."""
@@ -121,12 +125,14 @@ class _Worker:
         self._process.join()
 
 
-def _serve(connection: Connection, work: Callable) -> None:
-    """What a worker process does."""
+def _serve(connection: Connection) -> None:
+    """What a worker process does: the pipe brings the work, then units for it."""
     # Ctrl-C reaches the whole group of processes: the parent decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    with contextlib.suppress(EOFError, BrokenPipeError):
+    with contextlib.suppress(EOFError, ConnectionError):
+        # Only now its module is imported, which takes seconds, so that the parent is watched meanwhile.
+        work = connection.recv()
         while True:
             connection.send(attempt(work, connection.recv()))
 
