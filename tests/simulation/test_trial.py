@@ -27,7 +27,7 @@ def hand():
     return load_hand()
 
 
-def side_grasp(hand, distance, height=0.07, joints=None):
+def side_grasp(hand, distance, height=0.075, joints=None):
     """Palm x level towards the cylinder's axis, palm y up: fingers on one side, thumb on the other."""
     rotation = np.array([[-1.0, 0, 0], [0, 0, 1], [0, 1, 0]]).T
     return Grasps(
@@ -70,6 +70,18 @@ def test_hand_in_object_or_table_collides(hand, trial, distance, height):
     results = trial.run(grasps, np.eye(4))
     assert Outcome(results.outcome[0]) == Outcome.COLLISION
     assert not results.executed[0]
+
+
+def test_palm_in_the_table_collides(hand):
+    """The back of the hand lies 7 mm under the table top, the fingers 13 mm over it, far from the object."""
+    trial = GraspTrial(build_scene(hand, cylinder(), Physics(approach_distance=0.0, approach_steps=1)))
+    T_world_root = np.eye(4)
+    T_world_root[:3, :3] = np.stack([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]], axis=1)
+    T_world_root[:3, 3] = [0.5, 0.0, 0.03]
+    palm = T_world_root @ hand.T_root_palm
+    low = side_grasp(hand, 0.5).replace(rotation=palm[None, :3, :3], position=palm[None, :3, 3])
+    assert not trial.free(low, np.eye(4))[0]
+    assert trial.free(low.replace(position=low.position + np.array([0.0, 0.0, 0.01])), np.eye(4))[0]
 
 
 def test_heavy_object_stays_on_the_table(hand):

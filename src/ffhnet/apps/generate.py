@@ -42,18 +42,22 @@ class GenerateOptions:
     """Seed of all randomness, together with the object's own."""
     placements: int = 2
     """Resting poses per object, at most."""
-    views: int = 6
+    views: int = 4
     """Simulated views per placement."""
-    heuristic: int = 30
+    heuristic: int = 20
     """Executed trials per placement of the paper's sampler."""
-    power: int = 30
+    power: int = 35
     """Executed trials per placement of the power-grasp sampler."""
-    perturb: int = 50
+    perturb: int = 40
     """Trials per placement in each of two rounds around successes."""
     weights: Annotated[Path | None, absent("DIR")] = None
     """Weights whose generator proposes grasps too."""
     learned: int = 0
     """Executed trials per placement of that generator."""
+    repeated_share: float = 0.05
+    """Share of the trials with contact that are repeated under varied pose, mass and friction."""
+    repeats: int = 5
+    """How often."""
     executor: Literal["local", "ray"] = "local"
     """Where to work: processes of this machine, or a Ray cluster."""
     address: Annotated[str | None, absent("ADDR", "this machine's cluster, else a new one")] = None
@@ -65,6 +69,8 @@ class GenerateOptions:
 def run(options: GenerateOptions) -> None:
     """Generate, then print what the data set holds and which objects failed."""
     require_sim("generate")
+    if not 0 <= options.repeated_share <= 1 or not 1 <= options.repeats <= 100:
+        raise OptionError("--repeated-share must lie between 0 and 1, --repeats between 1 and 100")
     executor = _executor(options)
     sources = _sources(options)
     weights = _checked_weights(options)
@@ -82,6 +88,8 @@ def run(options: GenerateOptions) -> None:
         perturb=options.perturb,
         learned=options.learned,
         weights=weights,
+        repeated_share=options.repeated_share,
+        repeats=options.repeats,
     )
     with progress_bar("objects", len(unfinished(sources, options.out))) as step:
 

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 from jaxtyping import Bool, Float, Int
 
-from ffhnet.dataset.records import read_tables
+from ffhnet.dataset.records import read_tables, vectors
 from ffhnet.errors import ObjectError
 from ffhnet.objects.procedural import FIRST_SEED, SPLIT_SIZE, seed_of
 from ffhnet.simulation.trial import Outcome
@@ -109,10 +109,10 @@ def _columns(table: pa.Table) -> TrialColumns:
         placement=_integers(table, "placement"),
         proposer=np.array(table["proposer"].to_pylist()),
         outcome=np.array(table["outcome"].to_pylist()),
-        position=_vectors(table, "position"),
-        quaternion_wxyz=_vectors(table, "quaternion_wxyz"),
-        joints=_vectors(table, "joints"),
-        closed_joints=_vectors(table, "closed_joints"),
+        position=vectors(table["position"]).astype(float),
+        quaternion_wxyz=vectors(table["quaternion_wxyz"]).astype(float),
+        joints=vectors(table["joints"]).astype(float),
+        closed_joints=vectors(table["closed_joints"]).astype(float),
         contact_links=_numbers(table, "contact_links"),
         pushed=_numbers(table, "pushed"),
         repeats=_integers(table, "repeats"),
@@ -130,13 +130,3 @@ def _numbers(table: pa.Table, name: str) -> np.ndarray:
 def _integers(table: pa.Table, name: str) -> np.ndarray:
     """A column of integers, 0 where it is null or not there at all."""
     return np.nan_to_num(_numbers(table, name)).astype(int)
-
-
-def _vectors(table: pa.Table, name: str) -> np.ndarray:
-    """A column of lists of one length, NaN where it is null."""
-    column = table[name]
-    array = np.full((len(column), column.type.list_size), np.nan)
-    # `flatten` leaves the null rows out.
-    filled = [chunk.flatten().to_numpy(zero_copy_only=False) for chunk in column.chunks]
-    array[column.is_valid().to_numpy()] = np.concatenate(filled).reshape(-1, array.shape[1])
-    return array

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from ffhnet.errors import DatasetError, ObjectError, OptionError
 from ffhnet.files import only_writer, remove_unfinished, write_atomically
 from ffhnet.hands import load_hand
 from ffhnet.objects.catalogue import ObjectSource
+from ffhnet.objects.graspability import why_not_graspable
 
 
 def generate(
@@ -94,7 +97,14 @@ def _header(config: GenerateConfig) -> dict[str, Any]:
         "joint_names": list(hand.joint_names),
         "closes": [bool(moves) for moves in hand.closing.moves],
         "generation": dataclasses.asdict(config),
+        "versions": {"ffhnet": version("ffhnet"), "mujoco": version("mujoco"), "numpy": version("numpy")},
+        "generator_sha256": None if config.weights is None else _digest(Path(config.weights)),
     }
+
+
+def _digest(weights: Path) -> str:
+    """Which generator proposed: the path alone would not tell."""
+    return hashlib.sha256((weights / "generator.safetensors").read_bytes()).hexdigest()
 
 
 def _for_workers(config: GenerateConfig) -> GenerateConfig:
@@ -177,9 +187,11 @@ def run_unit(unit: Unit) -> UnitTables:
     """What a worker does with a unit.
 
     Raises:
-        ObjectError: nothing could be tried at the object, or what loading raises.
+        ObjectError: the object cannot be grasped, or nothing could be tried at it; or what loading raises.
     """
     obj = unit.source.load()
+    if reason := why_not_graspable(obj):
+        raise ObjectError(reason)
     trials, views = try_object(obj, unit.config)
     if not trials:
         raise ObjectError("no grasp could be tried at any of its resting poses")

@@ -10,7 +10,7 @@ from zlib import crc32
 
 import numpy as np
 
-from ffhnet.dataset.records import TrialBlock, ViewBlock, ViewRow
+from ffhnet.dataset.records import TrialBlock, ViewBlock, ViewRow, as_stored
 from ffhnet.errors import SceneError
 from ffhnet.grasps import Grasps
 from ffhnet.hands import DEFAULT_HAND, load_hand
@@ -20,6 +20,7 @@ from ffhnet.sampling.perturb import perturb
 from ffhnet.simulation.physics import Physics
 from ffhnet.simulation.scene import build_scene
 from ffhnet.simulation.trial import GraspTrial
+from ffhnet.simulation.variation import Variation, held_under_variation
 from ffhnet.simulation.views import View, ViewMaker
 
 if TYPE_CHECKING:
@@ -41,20 +42,25 @@ class GenerateConfig:
         perturb: trials per round and placement.
         max_collisions: start collisions kept as negatives per proposer and placement.
         learned: executed trials per placement of a trained generator; with `weights`.
+        repeated_share: share of the trials that touched the object which are repeated under variation.
+        repeats: how often.
         weights: folder of weights, or None for no learned proposals.
     """
 
     hand: str = DEFAULT_HAND
     seed: int = 0
     placements: int = 2
-    views: int = 6
-    heuristic: int = 30
-    power: int = 30
+    views: int = 4
+    heuristic: int = 20
+    power: int = 35
     perturb_rounds: int = 2
-    perturb: int = 50
-    max_collisions: int = 30
+    perturb: int = 40
+    max_collisions: int = 20
     learned: int = 0
     weights: str | None = None
+    repeated_share: float = 0.05
+    repeats: int = 5
+    variation: Variation = field(default_factory=Variation)
     physics: Physics = field(default_factory=Physics)
 
 
@@ -117,19 +123,34 @@ class _Placement:
         return [block for block in blocks if len(block.grasps)]
 
     def _block(self, proposer: str, grasps: Grasps) -> TrialBlock:
+        grasps = as_stored(grasps)
         results = self._trial.run(grasps, self._T_world_object)
-        return TrialBlock(self._placement, proposer, grasps, results)
+        chosen = (results.contact_links > 0) & (self._rng.random(len(grasps)) < self._config.repeated_share)
+        repeats, held = np.where(chosen, self._config.repeats, 0), np.zeros(len(grasps), dtype=int)
+        held[chosen] = held_under_variation(
+            self._trial,
+            grasps[chosen],
+            self._T_world_object,
+            self._config.repeats,
+            self._rng,
+            self._config.variation,
+        )
+        return TrialBlock(self._placement, proposer, grasps, results, repeats, held)
 
     def _try(self, name: str, wanted: int, propose: Callable[[View, int], Grasps]) -> TrialBlock:
         """Draws from all views; runs grasps that can be executed, and some that collide as negatives."""
         per_view = -(-wanted * DRAWS_PER_TRIAL // len(self._views))
         drawn = Grasps.concatenate([propose(view, per_view) for view in self._views])
-        drawn = drawn[self._rng.permutation(len(drawn))]
-        free = self._trial.free(drawn, self._T_world_object)
-        chosen = np.concatenate(
-            [np.flatnonzero(free)[:wanted], np.flatnonzero(~free)[: self._config.max_collisions]]
-        )
-        return self._block(name, drawn[chosen])
+        drawn = as_stored(drawn[self._rng.permutation(len(drawn))])
+        free: list[int] = []
+        colliding: list[int] = []
+        for i in range(len(drawn)):
+            reached = bool(self._trial.free(drawn[i : i + 1], self._T_world_object)[0])
+            (free if reached else colliding).append(i)
+            if len(free) == wanted:
+                break
+        chosen = free + colliding[: self._config.max_collisions]
+        return self._block(name, drawn[np.array(chosen, dtype=np.intp)])
 
     def _sample(self, preset: HeuristicConfig, view: View, count: int) -> Grasps:
         """The heuristic sampler on what a view shows, in the world frame."""

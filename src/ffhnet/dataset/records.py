@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
 from ffhnet.dataset.training_data import TrainingData
 from ffhnet.errors import DatasetError
@@ -24,7 +24,7 @@ from ffhnet.geometry.rotations import matrix_from_quaternion, quaternion_from_ma
 from ffhnet.grasps import Grasps
 from ffhnet.simulation.trial import Outcome, TrialResults
 
-FORMAT = 1
+FORMAT = 2
 PROPOSERS = ("heuristic", "power", "perturb", "learned")
 
 
@@ -53,12 +53,36 @@ class ViewBlock:
 
 @dataclass(frozen=True)
 class TrialBlock:
-    """Trials of one proposer on one placement; grasps in the world frame."""
+    """Trials of one proposer on one placement.
+
+    Attributes:
+        placement: index of the resting pose.
+        proposer: one of `PROPOSERS`.
+        grasps: world frame, as accurate as the files are (`as_stored`).
+        results: what became of them.
+        repeats: how often each trial was repeated under perturbation.
+        held: how many of the repeats succeeded.
+    """
 
     placement: int
     proposer: str
     grasps: Grasps
     results: TrialResults
+    repeats: Int[np.ndarray, " N"]
+    held: Int[np.ndarray, " N"]
+
+
+def as_stored(grasps: Grasps) -> Grasps:
+    """The grasps as they are read back from a file: rounded to 16 bit (0.1 mm, 0.05°, 0.5 mrad).
+
+    What is tried is rounded before, so that a label belongs to exactly the grasp that stands beside it.
+    """
+    quaternion = quaternion_from_matrix(grasps.rotation).astype(np.float16)
+    return grasps.replace(
+        rotation=matrix_from_quaternion(quaternion),
+        position=grasps.position.astype(np.float16).astype(float),
+        joints=grasps.joints.astype(np.float16).astype(float),
+    )
 
 
 def trials_table(object_name: str, blocks: list[TrialBlock]) -> pa.Table:
@@ -74,16 +98,18 @@ def trials_table(object_name: str, blocks: list[TrialBlock]) -> pa.Table:
                     "object": pa.array([object_name] * n).dictionary_encode(),
                     "placement": pa.array(np.full(n, block.placement, np.int8)),
                     "proposer": pa.array([block.proposer] * n).dictionary_encode(),
-                    "position": _lists(grasps.position, np.float32),
-                    "quaternion_wxyz": _lists(quaternion_from_matrix(grasps.rotation), np.float32),
+                    "position": _lists(grasps.position, np.float16),
+                    "quaternion_wxyz": _lists(quaternion_from_matrix(grasps.rotation), np.float16),
                     "joints": _lists(grasps.joints, np.float16),
                     "outcome": pa.array(outcomes).dictionary_encode(),
                     "margin": pa.array(results.margin.astype(np.float32)),
-                    "closed_joints": _lists(results.closed_joints, np.float16),
+                    "closed_joints": _lists(results.closed_joints, np.float16, missing=~results.executed),
                     "contact_links": pa.array(results.contact_links.astype(np.int8)),
-                    "pushed": pa.array(results.pushed.astype(np.float32)),
-                    "rise": pa.array(results.rise.astype(np.float32)),
-                    "hold_slip": pa.array(results.hold_slip.astype(np.float32)),
+                    "pushed": pa.array(results.pushed.astype(np.float16)),
+                    "rise": pa.array(results.rise.astype(np.float16)),
+                    "hold_slip": pa.array(results.hold_slip.astype(np.float16)),
+                    "repeats": pa.array(block.repeats.astype(np.int8)),
+                    "held": pa.array(block.held.astype(np.int8)),
                 }
             )
         )
@@ -94,11 +120,12 @@ def views_table(object_name: str, blocks: list[ViewBlock]) -> pa.Table:
     """Arrow table of views."""
     rows = [row for block in blocks for row in block.rows]
     placement = [block.placement for block in blocks for _ in block.rows]
+    bps_mm = np.clip(np.round(np.stack([row.bps for row in rows]) * 1000), 0, 255)
     return pa.table(
         {
             "object": pa.array([object_name] * len(rows)).dictionary_encode(),
             "placement": pa.array(np.array(placement, np.int8)),
-            "bps": _lists(np.stack([row.bps for row in rows]), np.float16),
+            "bps_mm": _lists(bps_mm, np.uint8),
             "table_height": pa.array(np.array([row.table_height for row in rows], np.float32)),
             "T_world_view": _lists(np.stack([row.T_world_view.ravel() for row in rows]), np.float32),
         }
@@ -195,14 +222,14 @@ def read_training_data(folders: list[Path]) -> TrainingData:
         object_names=tuple(objects.tolist()),
         placement_object=placement_object,
         view_placement=view_placement,
-        bps=_array(views["bps"]),
+        bps=vectors(views["bps_mm"]).astype(np.float16) * np.float16(0.001),
         table_height=views["table_height"].to_numpy(),
-        T_world_view=_array(views["T_world_view"]).reshape(-1, 4, 4).astype(float),
+        T_world_view=vectors(views["T_world_view"]).reshape(-1, 4, 4).astype(float),
         trial_placement=np.searchsorted(placements, trial_keys[known]),
-        rotation=matrix_from_quaternion(_array(trials["quaternion_wxyz"])),
-        position=_array(trials["position"]).astype(float),
-        joints=_array(trials["joints"]).astype(float),
-        closed_joints=_array(trials["closed_joints"]).astype(float),
+        rotation=matrix_from_quaternion(vectors(trials["quaternion_wxyz"])),
+        position=vectors(trials["position"]).astype(float),
+        joints=vectors(trials["joints"]).astype(float),
+        closed_joints=vectors(trials["closed_joints"]).astype(float),
         margin=trials["margin"].to_numpy().astype(float),
         label=(outcome == "success").astype(float),
         executed=outcome != "collision",
@@ -210,14 +237,24 @@ def read_training_data(folders: list[Path]) -> TrainingData:
     )
 
 
-def _lists(array: np.ndarray, dtype: type) -> pa.FixedSizeListArray:
+def _lists(
+    array: np.ndarray, dtype: type, missing: Bool[np.ndarray, " N"] | None = None
+) -> pa.FixedSizeListArray:
     flat = pa.array(np.ascontiguousarray(array, dtype=dtype).ravel())
-    return pa.FixedSizeListArray.from_arrays(flat, array.shape[1])
+    mask = None if missing is None else pa.array(missing)
+    return pa.FixedSizeListArray.from_arrays(flat, array.shape[1], mask=mask)
 
 
-def _array(column: pa.ChunkedArray) -> np.ndarray:
-    size = column.type.list_size
-    return np.concatenate([chunk.flatten().to_numpy().reshape(-1, size) for chunk in column.chunks])
+def vectors(column: pa.ChunkedArray) -> np.ndarray:
+    """A column of lists of one length as an N × length array, NaN where it is null."""
+    # `flatten` leaves the null rows out.
+    filled = np.concatenate([chunk.flatten().to_numpy() for chunk in column.chunks])
+    filled = filled.reshape(-1, column.type.list_size)
+    if column.null_count == 0:
+        return filled
+    array = np.full((len(column), column.type.list_size), np.nan, filled.dtype)
+    array[column.is_valid().to_numpy()] = filled
+    return array
 
 
 def _plain(table: pa.Table) -> pa.Table:

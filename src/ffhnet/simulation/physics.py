@@ -17,7 +17,8 @@ class Physics:
         control_period: s between updates of the finger targets; a multiple of the timestep.
         friction: sliding, torsional (m), rolling (m) coefficients of every contact.
         contact_time_constant: s of MuJoCo's soft contact (solref); at least two timesteps.
-        impratio: friction is this much stiffer than the normal force; 1 lets round objects creep out.
+        impratio: friction is this much stiffer than the normal force; 1 lets round objects creep out, 10 lets
+            held objects creep by 3 mm/s.
         lift_height: m that the hand rises relative to the table (section III-A).
         lift_duration: s of the quintic lift.
         hold_duration: s of holding at the top.
@@ -27,13 +28,13 @@ class Physics:
         approach_steps: number of poses checked along it.
     """
 
-    timestep: float = 0.004
+    timestep: float = 0.002
     control_period: float = 0.012
     friction: tuple[float, float, float] = (0.8, 0.005, 0.0001)
     contact_time_constant: float = 0.01
-    impratio: float = 10.0
+    impratio: float = 30.0
     lift_height: float = 0.20
-    lift_duration: float = 0.5
+    lift_duration: float = 0.7
     hold_duration: float = 0.5
     min_rise: float = 0.15
     max_hold_slip: float = 0.005

@@ -13,7 +13,6 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from ffhnet.geometry.rotations import quaternion_from_matrix
 from ffhnet.hands import Hand
 from ffhnet.objects.grasp_object import GraspObject
 from ffhnet.simulation.physics import Physics
@@ -32,6 +31,7 @@ class Scene:
         geom_owner: for each geom TABLE, OBJECT, HAND or ARM.
         hand_mocap, table_mocap: mocap indices.
         object_body: body id of the object.
+        nominal_mass, nominal_inertia: of the object as it was built, kg and kg m².
 
     The object's indices are -1 in a scene without one, the hand's mocap index is -1 where an arm carries it.
     """
@@ -49,11 +49,17 @@ class Scene:
     hand_mocap: int
     table_mocap: int
     object_body: int
+    nominal_mass: float
+    nominal_inertia: Float[np.ndarray, " 3"]
 
     def place_hand(self, T_world_root: Float[np.ndarray, "4 4"], joints: Float[np.ndarray, " J"]) -> None:
         """Sets the hand's root pose and joint angles (rad), coupled joints included."""
         self.data.mocap_pos[self.hand_mocap] = T_world_root[:3, 3]
-        self.data.mocap_quat[self.hand_mocap] = quaternion_from_matrix(T_world_root[:3, :3])
+        mujoco.mju_mat2Quat(self.data.mocap_quat[self.hand_mocap], T_world_root[:3, :3].ravel())
+        self.place_fingers(joints)
+
+    def place_fingers(self, joints: Float[np.ndarray, " J"]) -> None:
+        """Sets the hand's joint angles (rad), coupled joints included, and leaves it where it is."""
         self.data.qpos[self.joint_qpos] = joints
         self.data.qpos[self.follower_qpos] = joints[self.leader_joint]
 
@@ -61,11 +67,25 @@ class Scene:
         """Sets the object's pose."""
         q = self.object_qpos
         self.data.qpos[q : q + 3] = T_world_object[:3, 3]
-        self.data.qpos[q + 3 : q + 7] = quaternion_from_matrix(T_world_object[:3, :3])
+        mujoco.mju_mat2Quat(self.data.qpos[q + 3 : q + 7], T_world_object[:3, :3].ravel())
 
     def raise_hand(self, height: float) -> None:
         """Moves the hand to a height (m) over where it closed, seen from the table."""
         self.data.mocap_pos[self.table_mocap, 2] = -height
+
+    def vary(self, mass: float = 1.0, friction: float | None = None) -> None:
+        """Changes what the world is like from now on; without arguments it is nominal again.
+
+        Args:
+            mass: factor on the object's mass and inertia.
+            friction: sliding coefficient of every contact, the nominal one if none.
+        """
+        model, body = self.model, self.object_body
+        model.body_mass[body] = mass * self.nominal_mass
+        model.body_inertia[body] = mass * self.nominal_inertia
+        model.geom_friction[:, 0] = self.physics.friction[0] if friction is None else friction
+        # What the solver derives from mass; it leaves the scratch state behind at the reference pose.
+        mujoco.mj_setConst(model, self.data)
 
     @property
     def table_z(self) -> float:
@@ -109,7 +129,12 @@ def build_scene(
     if obj is not None:
         _add_object(spec, obj)
     hand_spec = mujoco.MjSpec.from_file(str(hand.mjcf))
-    add_mount(spec).add_frame().attach_body(hand_spec.worldbody.first_body(), PREFIX, "")
+    mount = add_mount(spec)
+    root = mount.add_frame().attach_body(hand_spec.worldbody.first_body(), PREFIX, "")
+    if mount.mocap:
+        # The palm stands as still as the table, and MuJoCo only looks at such pairs where they are named.
+        for geom in root.geoms:
+            spec.add_pair(geomname1="table", geomname2=geom.name)
     for geom in spec.geoms:
         geom.friction = physics.friction
         geom.solref = [physics.contact_time_constant, 1.0]
@@ -167,6 +192,8 @@ def _index(hand: Hand, physics: Physics, model: mujoco.MjModel) -> Scene:
         hand_mocap=int(model.body_mocapid[hand_body]),
         table_mocap=int(model.body_mocapid[model.body("table").id]),
         object_body=object_body,
+        nominal_mass=float(model.body_mass[object_body]),
+        nominal_inertia=model.body_inertia[object_body].copy(),
     )
 
 

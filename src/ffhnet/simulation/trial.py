@@ -14,9 +14,13 @@ from ffhnet.geometry.transforms import invert, make_transform
 from ffhnet.grasps import Grasps
 from ffhnet.simulation.scene import HAND, OBJECT, TABLE, Scene
 
-SETTLE_PERIODS = 6
-SETTLE_MOTION = 0.004
-"""rad: closing ends early when no joint has moved further during SETTLE_PERIODS control periods."""
+SWEEP_PERIODS = 2
+"""Control periods between the finger poses at which first contact is looked for: 3 mm at the tips."""
+
+REST_PERIODS = 8
+REST_SHARE = 0.25
+"""An object off the table is held when it moves in the hand at less than this share of the allowed slip for
+REST_PERIODS control periods: the hand stands still while the table sinks, so that nothing more can change."""
 
 
 _BOTH_WAYS = np.concatenate([np.eye(3), -np.eye(3)])
@@ -121,6 +125,10 @@ class GraspTrial:
             hold_slip=np.array([row.hold_slip for row in rows]),
         )
 
+    def vary(self, mass: float = 1.0, friction: float | None = None) -> None:
+        """Changes the object's mass (a factor) and all friction for the trials that follow (`Scene.vary`)."""
+        self._scene.vary(mass, friction)
+
     def free(self, grasps: Grasps, T_world_object: Float[np.ndarray, "4 4"]) -> Bool[np.ndarray, " N"]:
         """Whether the open hand can reach each palm pose on a straight approach along the palm's x axis."""
         self._reset(T_world_object)
@@ -148,8 +156,12 @@ class GraspTrial:
         return float(np.mean([not self._collides(pose, opened) for pose in poses]))
 
     def _collides(self, T_world_root: Float[np.ndarray, "4 4"], joints: Float[np.ndarray, " J"]) -> bool:
+        self._scene.place_hand(T_world_root, joints)
+        return self._hand_touches()
+
+    def _hand_touches(self) -> bool:
+        """Whether the hand, as it is placed, touches anything, itself included."""
         scene = self._scene
-        scene.place_hand(T_world_root, joints)
         mujoco.mj_kinematics(scene.model, scene.data)
         mujoco.mj_collision(scene.model, scene.data)
         owners = scene.geom_owner[scene.data.contact.geom]
@@ -184,58 +196,96 @@ class GraspTrial:
             return row
 
         row.outcome = Outcome.SLIPPED
-        for height in _quintic(physics.lift_duration, physics.control_period) * physics.lift_height:
+        anchor = self._object_position()
+        lift = _quintic(physics.lift_duration, physics.control_period) * physics.lift_height
+        for period, height in enumerate(lift, 1):
             self._scene.raise_hand(height)
             self._advance()
             row.rise = self._object_height() - start[2]
             # An object that lags by 10 cm has been left on the table or is falling.
             if height - row.rise > 0.10 or (height - row.rise > 0.01 and self._touching()[0] == 0):
                 return row
+            if period % REST_PERIODS == 0:
+                if self._rests(row, anchor, still_to_rise=physics.lift_height - height):
+                    return row
+                anchor = self._object_position()
         if row.rise < physics.min_rise:
             return row
 
         row.outcome = Outcome.DROPPED
-        held = self._object_position()
-        for _ in range(round(physics.hold_duration / physics.control_period)):
+        held = anchor = self._object_position()
+        for period in range(1, round(physics.hold_duration / physics.control_period) + 1):
             self._advance()
-        row.rise = self._object_height() - start[2]
+            row.rise = self._object_height() - start[2]
+            if period % REST_PERIODS == 0:
+                if self._rests(row, anchor):
+                    return row
+                anchor = self._object_position()
         row.hold_slip = float(np.linalg.norm(self._object_position() - held))
-        links, on_table = self._touching()
-        if (
-            links > 0
-            and not on_table
-            and row.rise >= physics.min_rise
-            and row.hold_slip <= physics.max_hold_slip
-        ):
+        if row.hold_slip <= physics.max_hold_slip and row.rise >= physics.min_rise and self._in_hand():
             row.outcome = Outcome.SUCCESS
         return row
+
+    def _rests(self, row: _Row, anchor: Float[np.ndarray, 3], still_to_rise: float = 0.0) -> bool:
+        """Ends the trial early where the object rests in the hand since it was at `anchor`."""
+        physics = self._physics
+        moved = float(np.linalg.norm(self._object_position() - anchor))
+        slip = moved * physics.hold_duration / (REST_PERIODS * physics.control_period)
+        rise = row.rise + still_to_rise
+        if slip > REST_SHARE * physics.max_hold_slip or rise < physics.min_rise or not self._in_hand():
+            return False
+        row.outcome, row.rise, row.hold_slip = Outcome.SUCCESS, rise, slip
+        return True
+
+    def _in_hand(self) -> bool:
+        links, on_table = self._touching()
+        return links > 0 and not on_table
 
     def _close(self, joints: Float[np.ndarray, " J"]) -> None:
         """Closes from the open hand towards the grasp's joints, then on until contact or limit decides.
 
-        On the way to the grasp's joints all fingers arrive together; from there on they close at one
-        speed. No target runs more than `lead` ahead of its joint.
+        Nothing happens before the fingers meet something, so the simulation starts shortly before they do,
+        or at the end of their way if they never do.
         """
         closing, scene = self.hand.closing, self._scene
-        step = closing.speed * self._physics.control_period
-        target = self.hand.open(joints)
-        way = joints - target
-        arriving = max(round(way.max() / step), 1)
-        settled = target
-        for k in range(round(closing.duration / self._physics.control_period)):
-            measured = scene.data.qpos[scene.joint_qpos]
-            if k > arriving and k % SETTLE_PERIODS == 0:
-                # Every finger stands still, against the object or its limit: waiting on changes nothing.
-                if np.abs(measured - settled).max() < SETTLE_MOTION:
-                    break
-                settled = measured.copy()
-            advanced = target + (way / arriving if k < arriving else step * closing.moves)
-            limit = np.minimum(measured + closing.lead, self.hand.upper)
-            target = np.where(closing.moves > 0, np.maximum(target, np.minimum(advanced, limit)), target)
+        advances = self._advances(joints)
+        path = self.hand.open(joints) + np.concatenate(
+            [np.zeros((1, len(joints))), np.cumsum(advances, axis=0)]
+        )
+        path = np.minimum(path, self.hand.upper)
+        start = self._last_free(path)
+        target = path[start]
+        scene.place_fingers(target)
+        scene.data.ctrl[scene.actuators] = target
+        mujoco.mj_forward(scene.model, scene.data)
+        for advance in advances[start:]:
+            limit = np.minimum(scene.data.qpos[scene.joint_qpos] + closing.lead, self.hand.upper)
+            target = np.maximum(target, np.minimum(target + advance, limit))
             scene.data.ctrl[scene.actuators] = target
             self._advance()
         for _ in range(round(closing.squeeze / self._physics.control_period)):
             self._advance()
+
+    def _advances(self, joints: Float[np.ndarray, " J"]) -> Float[np.ndarray, "K J"]:
+        """How far the targets advance in each control period, rad, where nothing holds them up.
+
+        On the way to the grasp's joints all fingers arrive together; from there on they close at one speed.
+        """
+        closing = self.hand.closing
+        way = joints - self.hand.open(joints)
+        step = closing.speed * self._physics.control_period
+        arriving = max(round(way.max() / step), 1)
+        periods = np.arange(round(closing.duration / self._physics.control_period))[:, None]
+        return np.where(periods < arriving, way / arriving, step * closing.moves)
+
+    def _last_free(self, path: Float[np.ndarray, "K J"]) -> int:
+        """The place on the path from which the closing is simulated."""
+        for k in range(0, len(path), SWEEP_PERIODS):
+            self._scene.place_fingers(path[k])
+            if self._hand_touches():
+                # One interval in which contact begins, and one in which the fingers come up to speed.
+                return max(k - 2 * SWEEP_PERIODS, 0)
+        return len(path) - 1
 
     def _advance(self) -> None:
         mujoco.mj_step(self._scene.model, self._scene.data, self._steps)

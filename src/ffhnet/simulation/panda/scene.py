@@ -94,8 +94,7 @@ class ArmScene(Scene):
     def place_arm(self, q: Float[np.ndarray, " 7"], joints: Float[np.ndarray, " J"]) -> None:
         """Sets the arm's joint angles and the hand's, coupled joints included (rad)."""
         self.data.qpos[self.arm_qpos] = q
-        self.data.qpos[self.joint_qpos] = joints
-        self.data.qpos[self.follower_qpos] = joints[self.leader_joint]
+        self.place_fingers(joints)
         self.data.ctrl[self.arm_actuators] = q
         self.posture.target, self.posture.height = q, 0.0
 
