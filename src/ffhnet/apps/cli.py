@@ -17,7 +17,7 @@ from typing import Annotated, Any, Union, cast
 
 import tyro
 
-from ffhnet.apps import data, evaluate, generate, grasp, hand, objects, train
+from ffhnet.apps import benchmark, data, evaluate, generate, grasp, hand, objects, train
 from ffhnet.errors import FFHNetError
 
 
@@ -38,6 +38,7 @@ COMMANDS = (
     Command("data", data.DataOptions, data.run),
     Command("train", train.TrainOptions, train.run),
     Command("evaluate", evaluate.EvaluateOptions, evaluate.run),
+    Command("benchmark", benchmark.BenchmarkOptions, benchmark.run),
 )
 
 ERROR_STATUS = 2

@@ -130,11 +130,15 @@ class FFHNet:
         return ObjectTensors(bps.unsqueeze(0), height)
 
 
+def shipped_weights() -> Path:
+    """Folder of the weights that come with the package."""
+    return Path(str(resources.files("ffhnet"))) / "weights"
+
+
 def _find_weights(path_or_name: str | Path | None) -> Path:
-    shipped = Path(str(resources.files("ffhnet"))) / "weights"
     if path_or_name is None:
-        return shipped
-    for folder in (Path(path_or_name), shipped / path_or_name):
+        return shipped_weights()
+    for folder in (Path(path_or_name), shipped_weights() / path_or_name):
         if folder.is_dir():
             return folder
     raise WeightsError(f"no folder and no shipped weights of the name {str(path_or_name)!r}")

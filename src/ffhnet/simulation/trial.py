@@ -104,13 +104,15 @@ class GraspTrial:
 
     Attributes:
         hand: the hand of the scene.
+        steps: simulation steps made so far.
     """
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self.hand = scene.hand
+        self.steps = 0
         self._physics = scene.physics
-        self._steps = round(scene.physics.control_period / scene.physics.timestep)
+        self._steps_per_period = round(scene.physics.control_period / scene.physics.timestep)
 
     def run(self, grasps: Grasps, T_world_object: Float[np.ndarray, "4 4"]) -> TrialResults:
         """Executes every grasp (world frame, table top z = 0) on the object at the given resting pose."""
@@ -288,7 +290,8 @@ class GraspTrial:
         return len(path) - 1
 
     def _advance(self) -> None:
-        mujoco.mj_step(self._scene.model, self._scene.data, self._steps)
+        mujoco.mj_step(self._scene.model, self._scene.data, self._steps_per_period)
+        self.steps += self._steps_per_period
 
     def _object_position(self) -> Float[np.ndarray, 3]:
         """Centre of mass of the object, world frame."""
