@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import platform
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,6 +46,8 @@ class BenchmarkOptions:
 def run(options: BenchmarkOptions) -> None:
     """Measure and print."""
     require_sim("benchmark")
+    import mujoco
+
     from ffhnet.dataset.executors import run_jobs
     from ffhnet.dataset.object_trials import GenerateConfig
     from ffhnet.dataset.physics_benchmark import measure_object
@@ -73,7 +76,12 @@ def run(options: BenchmarkOptions) -> None:
     _print(measured, figures)
     if options.json is not None:
         report = {
-            "machine": {"processor": platform.processor(), "python": platform.python_version()},
+            "machine": {
+                "architecture": platform.machine(),
+                "cores": os.cpu_count(),
+                "python": platform.python_version(),
+                "mujoco": mujoco.__version__,
+            },
             "mix": {
                 "objects": options.objects,
                 "first": options.first,
