@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float
 
 from ffhnet.dataset.object_trials import GenerateConfig, try_object
 from ffhnet.grasps import Grasps
-from ffhnet.hands import load_hand
+from ffhnet.hands import Hand, load_hand
 from ffhnet.objects.catalogue import ObjectSource
 from ffhnet.objects.grasp_object import GraspObject
 from ffhnet.simulation.physics import Physics
@@ -89,7 +89,7 @@ def measure_object(job: tuple[ObjectSource, GenerateConfig]) -> ObjectMeasuremen
         collisions=int((~executed).sum()),
         seconds=seconds,
         steps=trial.steps,
-        bare_step=_bare_step(obj, config.physics),
+        bare_step=_bare_step(hand, obj, config.physics),
     )
 
 
@@ -104,14 +104,13 @@ def _mix(
         yield obj.resting_poses[placement], Grasps.concatenate([block.grasps for block in mine]), proposers
 
 
-def _bare_step(obj: GraspObject, physics: Physics) -> float:
+def _bare_step(hand: Hand, obj: GraspObject, physics: Physics) -> float:
     """CPU time per step, s, with nothing but the open hand, far away, and the object at rest."""
-    hand = load_hand()
     scene = build_scene(hand, obj, physics)
     scene.place_object(obj.resting_poses[0])
     far = np.eye(4)
     far[:3, 3] = [0.5, 0.5, 0.5]
-    scene.place_hand(far, np.clip(np.zeros(hand.num_joints), hand.lower, hand.upper))
+    scene.place_hand(far, hand.open(np.zeros(hand.num_joints)))
     start = time.process_time()
     mujoco.mj_step(scene.model, scene.data, BARE_STEPS)
     return (time.process_time() - start) / BARE_STEPS
