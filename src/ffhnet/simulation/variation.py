@@ -25,7 +25,7 @@ class Variation:
 
     position: float = 0.003
     rotation: float = np.radians(3.0)
-    mass: tuple[float, float] = (0.5, 1.5)
+    mass: tuple[float, float] = (0.5, 2.0)
     friction: tuple[float, float] = (0.4, 1.0)
 
     def perturb(self, grasps: Grasps, rng: np.random.Generator) -> Grasps:
