@@ -11,8 +11,6 @@ import tyro
 from PIL import Image, ImageDraw, ImageFont
 
 from ffhnet.dataset.columns import TrialColumns, read_trial_columns
-from ffhnet.dataset.diversity import NEAR_ANGLE, NEAR_JOINTS, NEAR_POSITION
-from ffhnet.dataset.grasp_types import grasp_types
 from ffhnet.dataset.records import read_header
 from ffhnet.dataset.statistics import Rate, success_rate
 from ffhnet.evaluation.picture import save_png
@@ -23,6 +21,8 @@ from ffhnet.geometry.transforms import make_transform
 from ffhnet.hands import Hand, load_hand
 from ffhnet.objects.catalogue import resolve_objects
 from ffhnet.perception.raycast import RayScene
+from ffhnet.simulation.distinct import NEAR_ANGLE, NEAR_JOINTS, NEAR_POSITION
+from ffhnet.simulation.grasp_types import grasp_types
 
 IMAGES = Path(__file__).parent / "images"
 COLUMNS = 6

@@ -8,23 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from ffhnet.dataset.columns import TrialColumns, read_trial_columns
-from ffhnet.dataset.grasp_types import KINDS, entropy_bits, grasp_types
 from ffhnet.dataset.records import read_header
 from ffhnet.dataset.statistics import Rate, Summary
 from ffhnet.geometry.rotations import matrix_from_quaternion
 from ffhnet.hands import Hand, load_hand
-
-NEAR_POSITION = 0.02
-"""m between palms, up to which grasps can be the same."""
-
-NEAR_ANGLE = np.radians(20.0)
-"""rad between palms, likewise."""
-
-NEAR_JOINTS = 0.3
-"""rad, root mean square over the closed joints, likewise."""
+from ffhnet.simulation.distinct import is_distinct
+from ffhnet.simulation.grasp_types import KINDS, entropy_bits, grasp_types
 
 TRIALS = (5, 10, 20, 30, 50)
 """Executed trials per placement at which distinct grasps are counted."""
@@ -144,31 +136,6 @@ def diversity_table(measured: Sequence[ProposerDiversity], title: str) -> Summar
             for m in measured
         ),
     )
-
-
-def is_distinct(
-    position: Float[np.ndarray, "N 3"], rotation: Float[np.ndarray, "N 3 3"], joints: Float[np.ndarray, "N J"]
-) -> Bool[np.ndarray, " N"]:
-    """Which grasps of one placement are not within all three `NEAR_...` of an earlier distinct one.
-
-    Greedy in the given order, so the count among the first n does not depend on what follows.
-    """
-    n = len(position)
-    distinct = np.zeros(n, dtype=bool)
-    least_trace = 1 + 2 * np.cos(NEAR_ANGLE)
-    flat = rotation.reshape(n, 9)
-    kept = np.empty(n, dtype=int)
-    count = 0
-    for i in range(n):
-        near = kept[:count]
-        near = near[((position[near] - position[i]) ** 2).sum(axis=1) <= NEAR_POSITION**2]
-        near = near[flat[near] @ flat[i] >= least_trace]
-        near = near[((joints[near] - joints[i]) ** 2).mean(axis=1) <= NEAR_JOINTS**2]
-        if len(near) == 0:
-            distinct[i] = True
-            kept[count] = i
-            count += 1
-    return distinct
 
 
 def _describe(
