@@ -7,10 +7,8 @@ import pytest
 from trial_makers import HAND, make_trials, write_data_set
 
 from ffhnet.dataset.diversity import diversity
-from ffhnet.geometry.rotations import (
-    matrix_from_rotation_vector,
-    quaternion_from_matrix,
-)
+from ffhnet.geometry.rotations import matrix_from_rotation_vector, quaternion_from_matrix
+from ffhnet.simulation.distinct import NEAR_POSITION
 
 
 def two_proposers():
