@@ -76,19 +76,14 @@ class Samples:
     def __len__(self) -> int:
         return len(self.rank)
 
-    def __getitem__(self, index: slice | np.ndarray) -> Samples:
-        return Samples(
-            self.rank[index], self.score[index], self.drawn[index], self.grasps[index], self.tries[index]
-        )
-
 
 @dataclass(frozen=True)
 class Condition:
     """The same groups of grasps of one view in one kind of world: nominal, stressed, or strict.
 
     Attributes:
-        name: "nominal", the name of a stress, or "strict".
-        top: the first grasps of the network, best first.
+        name: "nominal", the name of a stress, "strict", or "strict, held".
+        top: the first grasps of the network, best first: five, or ten of a hundred in the strict protocol.
         random: some drawn samples that did not collide in the nominal world.
         blind_random_yaw: the blind control with random yaw.
         blind_short_side: the blind control that closes across the cloud's shorter side.
@@ -129,7 +124,8 @@ class ViewOutcome:
         samples: the executed samples of the generator.
         heuristic: the paper's sampler after its collision filter.
         conditions: nominal first, then each stress; only nominal where no stress was asked for.
-        strict: the strict protocol, None where it was not asked for.
+        strict: the strict protocol's two counts, "strict" and "strict, held"; empty where it was not asked
+            for.
         coverage: None but on full views.
         T_world_object: where the object stood.
         view: what the camera saw; None but on full views.
@@ -141,7 +137,7 @@ class ViewOutcome:
     samples: Samples
     heuristic: Tries
     conditions: tuple[Condition, ...]
-    strict: Condition | None
+    strict: tuple[Condition, ...]
     coverage: Coverage | None
     T_world_object: Float[np.ndarray, "4 4"]
     view: View | None
@@ -150,15 +146,6 @@ class ViewOutcome:
     def standing(self) -> bool:
         """Whether the object stands as modelled."""
         return self.pose_name == STANDING
-
-    @property
-    def drawn(self) -> Samples:
-        """The random subset: what rates, thresholds, kept shares and calibration are counted on."""
-        return self.samples[self.samples.drawn]
-
-    def top(self, count: int) -> Tries:
-        """The first grasps in the network's order."""
-        return self.samples.tries[self.samples.rank < count]
 
 
 @dataclass(frozen=True)
