@@ -53,14 +53,47 @@ def auroc(label: Float[np.ndarray, " N"], score: Float[np.ndarray, " N"]) -> flo
     return float(above / (num_positive * num_negative))
 
 
+@dataclass(frozen=True)
+class ReliabilityBin:
+    """Predictions between two probabilities.
+
+    Attributes:
+        low, high: of the bin.
+        count: predictions in it.
+        predicted: their mean; NaN of none.
+        observed: share of successes among them; NaN of none.
+    """
+
+    low: float
+    high: float
+    count: int
+    predicted: float
+    observed: float
+
+
+def reliability(
+    label: Float[np.ndarray, " N"], probability: Float[np.ndarray, " N"], bins: int = 10
+) -> tuple[ReliabilityBin, ...]:
+    """The reliability diagram over equally wide bins, lowest first."""
+    label, probability = _pair(label, probability)
+    index = np.minimum((probability * bins).astype(int), bins - 1)
+    count = np.bincount(index, minlength=bins)
+    predicted, observed = (
+        np.divide(np.bincount(index, values, bins), count, out=np.full(bins, np.nan), where=count > 0)
+        for values in (probability, label)
+    )
+    return tuple(
+        ReliabilityBin(k / bins, (k + 1) / bins, int(count[k]), float(predicted[k]), float(observed[k]))
+        for k in range(bins)
+    )
+
+
 def expected_calibration_error(
     label: Float[np.ndarray, " N"], probability: Float[np.ndarray, " N"], bins: int = 10
 ) -> float:
     """Mean gap between predicted and observed rate over equally wide bins, weighted by their counts."""
-    label, probability = _pair(label, probability)
-    index = np.minimum((probability * bins).astype(int), bins - 1)
-    gap = np.bincount(index, weights=probability - label, minlength=bins)
-    return float(np.abs(gap).sum() / len(label))
+    filled = [b for b in reliability(label, probability, bins) if b.count]
+    return sum(b.count * abs(b.predicted - b.observed) for b in filled) / sum(b.count for b in filled)
 
 
 def binary_cross_entropy(label: Float[np.ndarray, " N"], probability: Float[np.ndarray, " N"]) -> float:

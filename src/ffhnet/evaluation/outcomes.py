@@ -12,6 +12,7 @@ All sets are rows of one `Samples`, executed once each.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +42,11 @@ class Tries:
     def of(cls, results: TrialResults) -> Tries:
         """Of a table of trials."""
         return cls(results.success, results.executed)
+
+    @staticmethod
+    def join(parts: Sequence[Tries]) -> Tries:
+        """All in one."""
+        return Tries(np.concatenate([p.success for p in parts]), np.concatenate([p.executed for p in parts]))
 
     def __len__(self) -> int:
         return len(self.success)
