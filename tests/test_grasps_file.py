@@ -11,7 +11,7 @@ from ffhnet.grasps import Grasps
 from ffhnet.grasps_file import load_grasps, save_grasps
 
 
-def make_grasps(count, scored=True):
+def make_grasps(count, scored=True, robust=True):
     rng = np.random.default_rng(0)
     return Grasps(
         rotation=matrix_from_rotation_vector(rng.normal(size=(count, 3))),
@@ -21,13 +21,17 @@ def make_grasps(count, scored=True):
         hand="some_hand",
         frame="world",
         probability=rng.uniform(size=count) if scored else None,
+        robustness=rng.uniform(size=count) if scored and robust else None,
     )
 
 
 @pytest.mark.parametrize("suffix", [".json", ".npz"])
-@pytest.mark.parametrize(("count", "scored"), [(7, True), (7, False), (1, True), (0, True)])
-def test_round_trip(tmp_path, suffix, count, scored):
-    grasps = make_grasps(count, scored)
+@pytest.mark.parametrize(
+    ("count", "scored", "robust"),
+    [(7, True, True), (7, True, False), (7, False, False), (1, True, True), (0, True, True)],
+)
+def test_round_trip(tmp_path, suffix, count, scored, robust):
+    grasps = make_grasps(count, scored, robust)
     path = tmp_path / f"grasps{suffix}"
     save_grasps(grasps, path)
     back = load_grasps(path)
@@ -35,10 +39,11 @@ def test_round_trip(tmp_path, suffix, count, scored):
     np.testing.assert_allclose(back.rotation, grasps.rotation, atol=1e-12)
     np.testing.assert_array_equal(back.position, grasps.position)
     np.testing.assert_array_equal(back.joints, grasps.joints)
-    if scored:
-        np.testing.assert_array_equal(back.probability, grasps.probability)
-    else:
-        assert back.probability is None
+    for name in ("probability", "robustness"):
+        wanted, came = getattr(grasps, name), getattr(back, name)
+        assert (came is None) == (wanted is None)
+        if wanted is not None:
+            np.testing.assert_array_equal(came, wanted)
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
 

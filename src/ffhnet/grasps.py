@@ -11,6 +11,9 @@ from jaxtyping import Float
 
 from ffhnet.errors import OptionError
 
+SCORES = ("probability", "robustness")
+"""Attributes of `Grasps` that are predicted, one number per grasp."""
+
 
 @dataclass(frozen=True)
 class Grasps:
@@ -25,6 +28,8 @@ class Grasps:
         hand: name of the hand.
         frame: name of the frame, for example "world", "camera" or "view".
         probability: predicted probability that the grasp lifts the object, or None.
+        robustness: predicted probability that it does so with another mass and friction than expected and the
+            palm a little off; None where that is not known.
     """
 
     rotation: Float[np.ndarray, "N 3 3"]
@@ -34,12 +39,12 @@ class Grasps:
     hand: str
     frame: str
     probability: Float[np.ndarray, " N"] | None = None
+    robustness: Float[np.ndarray, " N"] | None = None
 
     def __post_init__(self) -> None:
         n = len(self.position)
         wanted = {"rotation": (n, 3, 3), "position": (n, 3), "joints": (n, len(self.joint_names))}
-        if self.probability is not None:
-            wanted["probability"] = (n,)
+        wanted |= {name: (n,) for name in SCORES if getattr(self, name) is not None}
         for name, shape in wanted.items():
             came = np.shape(getattr(self, name))
             if came != shape:
@@ -56,18 +61,28 @@ class Grasps:
             rotation=self.rotation[index],
             position=self.position[index],
             joints=self.joints[index],
-            probability=None if self.probability is None else self.probability[index],
+            **{name: _at(getattr(self, name), index) for name in SCORES},
         )
 
     def replace(self, **changes: Any) -> Grasps:
         """A copy with some attributes changed."""
         return dataclasses.replace(self, **changes)
 
-    def ranked(self) -> Grasps:
-        """Best first. Raises OptionError where there are no probabilities."""
-        if self.probability is None:
+    @property
+    def score(self) -> Float[np.ndarray, " N"]:
+        """What grasps are ranked by: robustness where it is known, else probability.
+
+        Raises:
+            OptionError: neither is known.
+        """
+        score = self.probability if self.robustness is None else self.robustness
+        if score is None:
             raise OptionError("grasps without probabilities cannot be ranked: evaluate them first")
-        return self[np.argsort(-self.probability, kind="stable")]
+        return score
+
+    def ranked(self) -> Grasps:
+        """Best first, by `score`."""
+        return self[np.argsort(-self.score, kind="stable")]
 
     def to_frame(self, T_new_old: Float[np.ndarray, "4 4"], frame: str) -> Grasps:
         """The same grasps in another frame; `T_new_old` takes old coordinates to new ones."""
@@ -86,12 +101,19 @@ class Grasps:
                 raise OptionError(
                     f"grasps of {part.hand} in {part.frame} cannot join {first.hand} in {first.frame}"
                 )
-        scored = all(part.probability is not None for part in parts)
         return first.replace(
             rotation=np.concatenate([p.rotation for p in parts]),
             position=np.concatenate([p.position for p in parts]),
             joints=np.concatenate([p.joints for p in parts]),
-            probability=np.concatenate([p.probability for p in parts if p.probability is not None])
-            if scored
-            else None,
+            **{name: _joined([getattr(p, name) for p in parts]) for name in SCORES},
         )
+
+
+def _at(score: Float[np.ndarray, " N"] | None, index: Any) -> Float[np.ndarray, " M"] | None:
+    return None if score is None else score[index]
+
+
+def _joined(scores: list[Float[np.ndarray, " N"] | None]) -> Float[np.ndarray, " M"] | None:
+    """All scores in a row, or None if one is not known."""
+    known = [score for score in scores if score is not None]
+    return np.concatenate(known) if len(known) == len(scores) else None

@@ -17,6 +17,9 @@ from ffhnet.grasps import Grasps
 
 SUFFIXES = (".json", ".npz")
 
+SCORE_NAMES = {"probability": "success_probability", "robustness": "robust_probability"}
+"""What the scores of `Grasps` are called in files."""
+
 _UNIT_TOLERANCE = 1e-3
 
 
@@ -24,8 +27,9 @@ def save_grasps(grasps: Grasps, path: str | Path) -> None:
     """Write grasps in their order and frame.
 
     A `.json` holds one object: `hand`, `frame`, `joint_names`, and `grasps`, a list of objects with
-    `palm_position` (m), `palm_quaternion_wxyz`, `joint_angles` (rad) and `success_probability` (null
-    where there is none). An `.npz` holds the same names as arrays, the grasps' fields stacked.
+    `palm_position` (m), `palm_quaternion_wxyz`, `joint_angles` (rad), `success_probability` and
+    `robust_probability` (null where not known). An `.npz` holds the same names as arrays, the grasps'
+    fields stacked, without those that are not known.
 
     Raises:
         OptionError: another suffix, or the file cannot be written.
@@ -54,26 +58,23 @@ def load_grasps(path: str | Path) -> Grasps:
         raise InputFileError(f"{path}: not a grasp file ({type(error).__name__}: {error})") from error
 
 
+def _columns(grasps: Grasps) -> dict[str, np.ndarray | None]:
+    """What a file holds of each grasp, by the names it has there; None where it is not known."""
+    return {
+        "palm_position": grasps.position,
+        "palm_quaternion_wxyz": quaternion_from_matrix(grasps.rotation),
+        "joint_angles": grasps.joints,
+        **{name: getattr(grasps, attribute) for attribute, name in SCORE_NAMES.items()},
+    }
+
+
 def _to_json(grasps: Grasps) -> bytes:
-    probability = [None] * len(grasps) if grasps.probability is None else grasps.probability.tolist()
-    rows = zip(
-        grasps.position.tolist(),
-        quaternion_from_matrix(grasps.rotation).tolist(),
-        grasps.joints.tolist(),
-        probability,
-        strict=True,
-    )
-    lines = [
-        json.dumps(
-            {
-                "palm_position": position,
-                "palm_quaternion_wxyz": quaternion,
-                "joint_angles": joints,
-                "success_probability": success,
-            }
-        )
-        for position, quaternion, joints, success in rows
-    ]
+    columns = {
+        name: [None] * len(grasps) if column is None else column.tolist()
+        for name, column in _columns(grasps).items()
+    }
+    rows = zip(*columns.values(), strict=True)
+    lines = [json.dumps(dict(zip(columns, row, strict=True))) for row in rows]
     header = json.dumps({"hand": grasps.hand, "frame": grasps.frame, "joint_names": list(grasps.joint_names)})
     # One grasp per line: indented JSON would take a line for each number.
     return (header[:-1] + ', "grasps": [\n' + ",\n".join(lines) + "\n]}\n").encode()
@@ -84,12 +85,8 @@ def _to_npz(grasps: Grasps) -> bytes:
         "hand": np.array(grasps.hand),
         "frame": np.array(grasps.frame),
         "joint_names": np.array(grasps.joint_names),
-        "palm_position": grasps.position,
-        "palm_quaternion_wxyz": quaternion_from_matrix(grasps.rotation),
-        "joint_angles": grasps.joints,
+        **{name: column for name, column in _columns(grasps).items() if column is not None},
     }
-    if grasps.probability is not None:
-        fields["success_probability"] = grasps.probability
     buffer = io.BytesIO()
     np.savez(buffer, **fields)
     return buffer.getvalue()
@@ -98,10 +95,12 @@ def _to_npz(grasps: Grasps) -> bytes:
 def _read_json(path: Path) -> dict[str, Any]:
     content = json.loads(path.read_text(encoding="utf-8"))
     rows = content["grasps"]
-    names = ("palm_position", "palm_quaternion_wxyz", "joint_angles", "success_probability")
+    names = ("palm_position", "palm_quaternion_wxyz", "joint_angles")
     fields = {name: [row[name] for row in rows] for name in names}
-    if any(value is None for value in fields["success_probability"]):
-        del fields["success_probability"]
+    for name in SCORE_NAMES.values():
+        values = [row.get(name) for row in rows]
+        if None not in values:
+            fields[name] = values
     return {**{name: content[name] for name in ("hand", "frame", "joint_names")}, **fields}
 
 
@@ -116,7 +115,11 @@ def _from_fields(fields: dict[str, Any]) -> Grasps:
     length = np.linalg.norm(quaternion, axis=1)
     if np.any(np.abs(length - 1) > _UNIT_TOLERANCE):
         raise ValueError(f"quaternions must have length 1, got {length[np.abs(length - 1).argmax()]:.4f}")
-    probability = fields.get("success_probability")
+    scores = {
+        attribute: np.asarray(fields[name], dtype=float)
+        for attribute, name in SCORE_NAMES.items()
+        if name in fields
+    }
     return Grasps(
         rotation=matrix_from_quaternion(quaternion) if len(quaternion) else np.zeros((0, 3, 3)),
         position=np.asarray(fields["palm_position"], dtype=float).reshape(-1, 3),
@@ -124,5 +127,5 @@ def _from_fields(fields: dict[str, Any]) -> Grasps:
         joint_names=joint_names,
         hand=str(fields["hand"]),
         frame=str(fields["frame"]),
-        probability=None if probability is None else np.asarray(probability, dtype=float),
+        **scores,
     )

@@ -7,7 +7,7 @@ from PIL import Image
 
 from ffhnet.geometry.transforms import apply
 from ffhnet.hands import load_hand
-from ffhnet.model import CheckpointInfo, FFHEvaluator, FFHGenerator, ModelConfig, save_checkpoint
+from ffhnet.model import CheckpointInfo, FFHEvaluator, FlowGenerator, ModelConfig, save_checkpoint
 from ffhnet.objects.catalogue import resolve_objects
 from ffhnet.perception.camera import REALSENSE_D415, look_at, render_depth
 from ffhnet.perception.cloud import depth_to_cloud
@@ -48,11 +48,11 @@ def cloud_npy(object_cloud, tmp_path_factory):
 def untrained_weights(tmp_path_factory):
     """Weights of the right form, drawn at random: what the commands do does not depend on their quality."""
     hand = load_hand()
-    config = ModelConfig(num_joints=hand.num_joints, width=32, inner_width=16)
+    config = ModelConfig(num_joints=hand.num_joints, width=32, inner_width=16, flow_width=32)
     info = CheckpointInfo(hand.name, hand.joint_names, tuple(hand.lower), tuple(hand.upper), config)
     torch.manual_seed(0)
     folder = tmp_path_factory.mktemp("weights")
-    save_checkpoint(folder, info, FFHGenerator(config), FFHEvaluator(config))
+    save_checkpoint(folder, info, FlowGenerator(config), FFHEvaluator(config))
     return folder
 
 

@@ -10,6 +10,7 @@ from ffhnet.dataset.scoring import score
 from ffhnet.dataset.training_data import TrainingData
 from ffhnet.geometry.rotations import about_z
 from ffhnet.geometry.transforms import make_transform
+from ffhnet.model.evaluator import EvaluatorLogits
 
 COUNT = 60
 
@@ -36,6 +37,7 @@ def data():
         closed_joints=np.zeros((COUNT, 1)),
         margin=np.ones(COUNT),
         label=((position[:, 2] > 0) & executed).astype(float),
+        robust=np.full(COUNT, np.nan),
         executed=executed,
         proposer=np.zeros(COUNT, int),
     )
@@ -43,7 +45,7 @@ def data():
 
 def by_height(objects, grasps):
     """The world's z of the palm as a logit: z of the view frame lies 0.3 m above the world's origin."""
-    return 100 * (grasps.position[..., 2] + 0.3)
+    return EvaluatorLogits(100 * (grasps.position[..., 2] + 0.3))
 
 
 def test_a_perfect_evaluator(data):
@@ -55,7 +57,7 @@ def test_a_perfect_evaluator(data):
 
 
 def test_chance_and_calibration(data):
-    scores = score(data, lambda objects, grasps: torch.zeros(grasps.position.shape[:2]))
+    scores = score(data, lambda objects, grasps: EvaluatorLogits(torch.zeros(grasps.position.shape[:2])))
     assert scores.auroc_executed == 0.5
     rate = data.label[data.executed].mean()
     assert scores.ece_executed == pytest.approx(abs(0.5 - rate), abs=0.05)

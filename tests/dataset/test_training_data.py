@@ -36,6 +36,7 @@ def data() -> TrainingData:
         closed_joints=np.repeat(trial_object[:, None], 2, axis=1).astype(float),
         margin=np.ones(len(trial_object)),
         label=np.where(np.arange(30) % 2, 1.0, 0.0),
+        robust=np.arange(30) / 30,
         executed=np.arange(30) % 2 == 1,
         proposer=trial_object,
     )
@@ -111,6 +112,7 @@ def test_local_success_is_a_weighted_rate_of_the_neighbours():
         closed_joints=np.zeros((count, 1)),
         margin=np.ones(count),
         label=success.astype(float),
+        robust=np.full(count, np.nan),
         executed=np.ones(count, bool),
         proposer=np.zeros(count, int),
     )

@@ -17,7 +17,7 @@ from ffhnet.model.checkpoint import Checkpoint
 from ffhnet.model.pca import Projection
 
 torch.set_num_threads(1)
-MODEL = ModelConfig(num_joints=2, bps_size=32, pca_components=4, inner_width=16, width=24)
+MODEL = ModelConfig(num_joints=2, bps_size=32, pca_components=4, inner_width=16, width=24, generator="cvae")
 INFO = CheckpointInfo("some_hand", ("a", "b"), (0.0, -0.05), (0.05, 0.05), MODEL)
 
 
@@ -57,8 +57,8 @@ def test_grasps_are_ranked_and_complete(net: FFHNet, view: View):
     grasps = net.grasp(view, num=200)
     assert len(grasps) == 200
     assert (grasps.frame, grasps.hand, grasps.joint_names) == ("camera", "some_hand", ("a", "b"))
-    assert (np.diff(grasps.probability) <= 0).all()
-    assert grasps.probability[0] > grasps.probability[-1]
+    assert (np.diff(grasps.robustness) <= 0).all()
+    assert grasps.robustness[0] > grasps.robustness[-1]
     product = grasps.rotation @ np.swapaxes(grasps.rotation, 1, 2)
     np.testing.assert_allclose(product, np.broadcast_to(np.eye(3), product.shape), atol=1e-5)
     np.testing.assert_allclose(np.linalg.det(grasps.rotation), 1, atol=1e-5)
@@ -94,7 +94,9 @@ def test_input_frame_is_the_view_frame_taken_through_t_input_view(net: FFHNet, v
 def test_evaluate_agrees_with_grasp_in_any_order(net: FFHNet, view: View):
     grasps = net.grasp(view, num=60)
     order = np.random.default_rng(0).permutation(60)
-    np.testing.assert_allclose(net.evaluate(view, grasps[order]), grasps.probability[order], atol=1e-5)
+    np.testing.assert_allclose(
+        net.evaluate(view, grasps[order]).probability, grasps.probability[order], atol=1e-5
+    )
 
 
 def test_threshold_keeps_the_best(net: FFHNet, view: View):

@@ -4,6 +4,7 @@ import numpy as np
 import torch
 
 from ffhnet.model import GraspTensors
+from ffhnet.model.evaluator import EvaluatorLogits
 from ffhnet.model.generator import LatentGaussian
 from ffhnet.model.losses import evaluator_loss, generator_loss, kl_divergence
 
@@ -48,9 +49,27 @@ def test_latent_sample_is_mean_plus_deviation_times_noise():
     torch.testing.assert_close(latent.sample(torch.ones(1, 1, 5)), torch.full((1, 1, 5), 5.0))
 
 
+def cross_entropy(logits, label):
+    p = 1 / (1 + np.exp(-logits))
+    return -np.mean(label * np.log(p) + (1 - label) * np.log(1 - p))
+
+
 def test_evaluator_loss_with_soft_labels():
     logits, logits_t = tensors((3, 4))
     label = RNG.random((3, 4))
-    p = 1 / (1 + np.exp(-logits))
-    wanted = -np.mean(label * np.log(p) + (1 - label) * np.log(1 - p))
-    np.testing.assert_allclose(evaluator_loss(logits_t, torch.from_numpy(label)).item(), wanted)
+    unknown = torch.full((3, 4), torch.nan)
+    loss = evaluator_loss(EvaluatorLogits(logits_t), torch.from_numpy(label), unknown, torch.zeros(3, 4))
+    np.testing.assert_allclose(loss.item(), cross_entropy(logits, label))
+
+
+def test_evaluator_loss_of_three_outputs_leaves_out_what_was_not_repeated():
+    (success, success_t), (robust, robust_t), (collision, collision_t) = (tensors((3, 4)) for _ in range(3))
+    label, held, collided = RNG.random((3, 4)), RNG.random((3, 4)), RNG.integers(2, size=(3, 4))
+    held[:, 2] = np.nan
+    loss = evaluator_loss(
+        EvaluatorLogits(success_t, robust_t, collision_t),
+        *(torch.from_numpy(array.astype(float)) for array in (label, held, collided)),
+    )
+    known = ~np.isnan(held)
+    parts = ((success, label), (robust[known], held[known]), (collision, collided))
+    np.testing.assert_allclose(loss.item(), sum(cross_entropy(*part) for part in parts))

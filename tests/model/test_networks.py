@@ -17,8 +17,17 @@ from ffhnet.model.pca import Projection
 from ffhnet.model.resblock import ConditionedLinear, ResBlock
 
 torch.set_num_threads(1)
-SMALL = ModelConfig(num_joints=4, bps_size=24, pca_components=6, inner_width=16, width=20, dropout=0.0)
-SMALL_PAPER = replace(SMALL, pca_components=None, use_table_height=False, input_batch_norm=True)
+SMALL = ModelConfig(
+    num_joints=4, bps_size=24, pca_components=6, inner_width=16, width=20, dropout=0.0, palm_points=7
+)
+SMALL_PAPER = replace(
+    SMALL,
+    pca_components=None,
+    use_table_height=False,
+    input_batch_norm=True,
+    palm_points=0,
+    judge_robustness=False,
+)
 
 
 def count(module: nn.Module) -> int:
@@ -42,6 +51,9 @@ def random_inputs(config: ModelConfig, views: int = 5, grasps: int = 7) -> tuple
 
 
 def with_random_projection(module: FFHGenerator | FFHEvaluator) -> None:
+    geometry = getattr(module, "geometry", None)
+    if geometry is not None:
+        geometry.set_points(np.random.default_rng(1).normal(size=(module.config.palm_points, 3)) * 0.05)
     if module.config.pca_components is not None:
         rng = np.random.default_rng(0)
         shape = (module.config.bps_size, module.config.pca_components)
@@ -68,7 +80,7 @@ def test_evaluator_ignores_joints_only_when_told_to():
         module = FFHEvaluator(config).eval()
         objects, grasps = random_inputs(config)
         moved = replace(grasps, joints=grasps.joints + 0.3)
-        same = torch.equal(module(objects, grasps), module(objects, moved))
+        same = torch.equal(module(objects, grasps).success, module(objects, moved).success)
         assert same is not use_joints
 
 
@@ -78,7 +90,7 @@ def test_table_height_matters_only_when_used():
         module = FFHEvaluator(config).eval()
         objects, grasps = random_inputs(config)
         moved = replace(objects, table_height=objects.table_height - 0.05)
-        assert torch.equal(module(objects, grasps), module(moved, grasps)) is not used
+        assert torch.equal(module(objects, grasps).success, module(moved, grasps).success) is not used
 
 
 def test_conditioned_linear_is_a_linear_layer_on_the_concatenation():
@@ -118,7 +130,7 @@ def test_grouped_evaluator_equals_plain_one_with_gradients(config: ModelConfig):
     outputs, gradients = [], []
     for o, g in ((objects, grasps), (objects.repeat(7), grasps.ungrouped())):
         module.zero_grad()
-        logits = module(o, g)
+        logits = module(o, g).success
         logits.square().sum().backward()
         outputs.append(logits.flatten())
         gradients.append(torch.cat([p.grad.flatten() for p in module.parameters()]))

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from ffhnet.perception.bps import basis_points, encode, encode_cloud_centroid
+from ffhnet.geometry.basis import basis_points
+from ffhnet.perception.bps import encode, encode_cloud_centroid
 from ffhnet.perception.capture import read_cloud
 
 

@@ -17,7 +17,9 @@ JOINT_NAMES = ("a", "b", "c")
 JOINT_LIMITS = ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
 SUCCESS_RADIUS = 0.03
 BASIS = np.random.default_rng(99).normal(size=(64, 3)) * 0.1
-MODEL = ModelConfig(num_joints=3, bps_size=64, pca_components=12, inner_width=48, width=64, dropout=0.1)
+MODEL = ModelConfig(
+    num_joints=3, bps_size=64, pca_components=12, inner_width=48, width=64, dropout=0.1, palm_points=0
+)
 
 
 def point_world(seed: int, objects: int = 60, views: int = 3, trials: int = 60) -> TrainingData:
@@ -59,6 +61,7 @@ def point_world(seed: int, objects: int = 60, views: int = 3, trials: int = 60) 
         closed_joints=joints,
         margin=np.ones(len(joints)),
         label=(near & executed).astype(float),
+        robust=np.where(np.arange(len(joints)) % 3 == 0, near & executed, np.nan),
         executed=executed,
         proposer=np.zeros(len(position), dtype=int),
     )

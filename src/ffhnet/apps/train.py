@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -13,10 +13,16 @@ from ffhnet.apps.console import absent, print_table
 from ffhnet.apps.extras import require_sim
 from ffhnet.errors import OptionError
 
+if TYPE_CHECKING:
+    from ffhnet.training.processes import Processes
+
 
 @dataclass(frozen=True)
 class TrainOptions:
-    """Train the generator and the evaluator; a run that was stopped goes on from its last state."""
+    """Train the generator and the evaluator; a run that was stopped goes on from its last state.
+
+    Several processes train together when torchrun starts them: `torchrun --nproc-per-node 2 -m ffhnet train`.
+    """
 
     data: Annotated[tuple[Path, ...], tyro.conf.Positional]
     """Data sets, as made by `ffhnet generate`."""
@@ -34,19 +40,34 @@ class TrainOptions:
     """Optimiser steps of each network."""
     seed: int = 0
     """Seed of initial weights, batches and noise."""
-    threads: int = field(default_factory=lambda: os.cpu_count() or 1)
-    """Processor threads."""
+    threads: int = field(default_factory=lambda: _cores_per_process())
+    """Processor threads of each process."""
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    """Where to compute; auto takes a GPU where there is one."""
+
+
+def _cores_per_process() -> int:
+    """This machine's cores among the processes that torchrun started on it."""
+    return max(1, (os.cpu_count() or 1) // int(os.environ.get("LOCAL_WORLD_SIZE", 1)))
 
 
 def run(options: TrainOptions) -> None:
     """Train, then print the held-out metrics."""
     require_sim("train")
+    from ffhnet.training.processes import joined
+
+    with joined(options.device) as processes:
+        _train(options, processes)
+
+
+def _train(options: TrainOptions, processes: Processes) -> None:
     import dataclasses
 
     import torch
 
     from ffhnet.dataset.records import read_training_data
     from ffhnet.hands import load_hand
+    from ffhnet.hands.surface_points import surface_points
     from ffhnet.model.checkpoint import load_checkpoint, read_info
     from ffhnet.training.config import TrainingConfig
     from ffhnet.training.train import train_evaluator, train_generator
@@ -61,14 +82,16 @@ def run(options: TrainOptions) -> None:
     config = dataclasses.replace(config, steps=options.steps or config.steps, seed=options.seed)
     hand = load_hand(data.hand)
     limits = (hand.lower.tolist(), hand.upper.tolist())
-    print(f"{len(data.object_names)} objects, {data.num_views} views, {data.num_trials} trials")
+    points = surface_points(hand, config.model.palm_points) if config.model.palm_points else None
+    if processes.first:
+        print(f"{len(data.object_names)} objects, {data.num_views} views, {data.num_trials} trials")
     if options.networks != "evaluator":
         begin = None if start is None else start.generator
-        train_generator(data, val, config, options.out, limits, start=begin)
+        train_generator(data, val, config, options.out, limits, points, begin, processes=processes)
     if options.networks != "generator":
         judge = None if start is None else start.evaluator
-        train_evaluator(data, val, config, options.out, limits, start=judge)
-    if val is not None:
+        train_evaluator(data, val, config, options.out, limits, points, judge, processes=processes)
+    if processes.first and val is not None:
         summary = read_info(options.out).training
         rows = [
             (network, name, f"{value:.4f}")

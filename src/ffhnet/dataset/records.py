@@ -204,7 +204,9 @@ def read_training_data(folders: list[Path]) -> TrainingData:
         raise DatasetError("wanted at least one data set, got none")
     if any((h["hand"], h["joint_names"]) != (headers[0]["hand"], headers[0]["joint_names"]) for h in headers):
         raise DatasetError("the data sets are of different hands or joint orders")
-    trials = pa.concat_tables([_plain(read_tables(f, "trials")) for f in folders])
+    tables = [_plain(read_tables(folder, "trials")) for folder in folders]
+    robust = np.concatenate([_robust(table, k) for k, table in enumerate(tables)])
+    trials = pa.concat_tables(tables)
     views = pa.concat_tables([_plain(read_tables(f, "views")) for f in folders])
 
     view_keys, trial_keys = _placement_keys(views), _placement_keys(trials)
@@ -232,9 +234,22 @@ def read_training_data(folders: list[Path]) -> TrainingData:
         closed_joints=vectors(trials["closed_joints"]).astype(float),
         margin=trials["margin"].to_numpy().astype(float),
         label=(outcome == "success").astype(float),
+        robust=robust[known],
         executed=outcome != "collision",
         proposer=np.array([PROPOSERS.index(p) for p in trials["proposer"].to_pylist()]),
     )
+
+
+def _robust(trials: pa.Table, seed: int) -> Float[np.ndarray, " T"]:
+    """`TrainingData.robust` of the trials of one data set."""
+    repeats = trials["repeats"].to_numpy().astype(float)
+    held = trials["held"].to_numpy()
+    share = np.divide(held, repeats, out=np.full(len(repeats), np.nan), where=repeats > 0)
+    hopeless = np.isin(np.array(trials["outcome"].to_pylist()), ("collision", "missed"))
+    if (~hopeless).any():
+        rate = (repeats[~hopeless] > 0).mean()
+        share[hopeless & (np.random.default_rng(seed).random(len(share)) < rate)] = 0.0
+    return share
 
 
 def _lists(

@@ -66,4 +66,4 @@ def _rate(
     objects = ObjectTensors(tensor(data.bps[view]), tensor(data.table_height[view]))
     grasps = GraspTensors(tensor(rotation), tensor(position), tensor(data.joints[trials]))
     with torch.inference_mode():
-        return torch.sigmoid(evaluator(objects, grasps)[0].double()).numpy()
+        return torch.sigmoid(evaluator(objects, grasps).success[0].double()).numpy()

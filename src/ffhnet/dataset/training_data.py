@@ -35,7 +35,10 @@ class TrainingData:
         joints: joint angles to which the open hand was closed, radians.
         closed_joints: joint angles that it reached, against object or limit, radians.
         margin: share of neighbouring palm poses at which the open hand touches nothing either.
-        label: success in [0, 1]; a fraction where a trial was repeated under varied physics.
+        label: success in [0, 1] in nominal physics.
+        robust: share of repeats under varied physics that succeeded; NaN where a trial was not repeated.
+            Those that cannot succeed (start collisions, no contact) are 0 as often as the others were
+            repeated, so that what is known is a fair sample of all.
         executed: False where the hand collided at the start, so that nothing was executed (label 0).
         proposer: code of what proposed the grasp.
     """
@@ -56,6 +59,7 @@ class TrainingData:
     closed_joints: Float[np.ndarray, "T J"]
     margin: Float[np.ndarray, " T"]
     label: Float[np.ndarray, " T"]
+    robust: Float[np.ndarray, " T"]
     executed: Bool[np.ndarray, " T"]
     proposer: Int[np.ndarray, " T"]
 
@@ -71,6 +75,7 @@ class TrainingData:
             "closed_joints": (trials, len(self.joint_names)),
             "margin": (trials,),
             "label": (trials,),
+            "robust": (trials,),
             "executed": (trials,),
             "proposer": (trials,),
         }
@@ -138,6 +143,7 @@ class TrainingData:
             closed_joints=self.closed_joints[trials],
             margin=self.margin[trials],
             label=self.label[trials],
+            robust=self.robust[trials],
             executed=self.executed[trials],
             proposer=self.proposer[trials],
         )

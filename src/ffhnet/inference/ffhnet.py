@@ -67,14 +67,15 @@ class FFHNet:
             threshold: grasps below this success probability are left out, possibly all.
 
         Returns:
-            Grasps in the observation's input frame, most probable first.
+            Grasps in the observation's input frame, best first: by `robustness` where the evaluator predicts
+            it, else by `probability`.
         """
         if not 0 <= threshold <= 1:
             raise OptionError(f"the threshold is a probability between 0 and 1, got {threshold}")
         in_view = self.generate(observation, num, torch.Generator().manual_seed(seed))
-        probability = self._rate(observation, in_view)
-        kept = probability >= threshold
-        ranked = in_view[kept].replace(probability=probability[kept]).ranked()
+        rated = self._rate(observation, in_view)
+        assert rated.probability is not None
+        ranked = rated[rated.probability >= threshold].ranked()
         return ranked.to_frame(observation.T_input_view, observation.frame)
 
     def generate(self, observation: Observation, num: int, generator: torch.Generator) -> Grasps:
@@ -87,9 +88,8 @@ class FFHNet:
         """
         if num < 1:
             raise OptionError(f"the number of grasps must be at least 1, got {num}")
-        latent = torch.randn(1, num, self.info.model.latent, generator=generator).to(self.device)
         with torch.inference_mode():
-            raw = self.generator.decode(self._objects(observation), latent)
+            raw = self.generator.sample(self._objects(observation), num, generator)
         return Grasps(
             rotation=raw.rotation[0].double().cpu().numpy(),
             position=raw.position[0].double().cpu().numpy(),
@@ -99,8 +99,12 @@ class FFHNet:
             frame=VIEW_FRAME,
         )
 
-    def evaluate(self, observation: Observation, grasps: Grasps) -> Float[np.ndarray, " N"]:
-        """Success probability of grasps given in the observation's input frame.
+    def evaluate(self, observation: Observation, grasps: Grasps) -> Grasps:
+        """The same grasps, in the same order, with `probability` and, if it is predicted, `robustness`.
+
+        Args:
+            observation: what the camera sees of the object.
+            grasps: in the observation's input frame.
 
         Raises:
             HandError: grasps of another hand or with other joints.
@@ -110,16 +114,20 @@ class FFHNet:
             raise HandError(f"these networks rate grasps of {self.info.hand}, got {grasps.hand}'s joints")
         if grasps.frame != observation.frame:
             raise OptionError(f"wanted grasps in frame {observation.frame!r}, got {grasps.frame!r}")
-        return self._rate(observation, grasps.to_frame(invert(observation.T_input_view), VIEW_FRAME))
+        rated = self._rate(observation, grasps.to_frame(invert(observation.T_input_view), VIEW_FRAME))
+        return grasps.replace(probability=rated.probability, robustness=rated.robustness)
 
-    def _rate(self, observation: Observation, in_view: Grasps) -> Float[np.ndarray, " N"]:
+    def _rate(self, observation: Observation, in_view: Grasps) -> Grasps:
         def tensor(array: np.ndarray) -> torch.Tensor:
             return torch.as_tensor(array, dtype=torch.float32, device=self.device).unsqueeze(0)
 
         grasps = GraspTensors(tensor(in_view.rotation), tensor(in_view.position), tensor(in_view.joints))
         with torch.inference_mode():
             logits = self.evaluator(self._objects(observation), grasps)
-        return torch.sigmoid(logits[0].double()).cpu().numpy()
+        return in_view.replace(
+            probability=_probability(logits.success),
+            robustness=None if logits.robust is None else _probability(logits.robust),
+        )
 
     def _objects(self, observation: Observation) -> ObjectTensors:
         wanted = self.info.model.bps_size
@@ -128,6 +136,10 @@ class FFHNet:
         bps = torch.as_tensor(observation.bps, dtype=torch.float32, device=self.device)
         height = torch.tensor([observation.table_height], dtype=torch.float32, device=self.device)
         return ObjectTensors(bps.unsqueeze(0), height)
+
+
+def _probability(logits: Float[torch.Tensor, "1 N"]) -> Float[np.ndarray, " N"]:
+    return torch.sigmoid(logits[0].double()).cpu().numpy()
 
 
 def shipped_weights() -> Path:

@@ -17,9 +17,13 @@ from torch import nn
 from ffhnet.errors import OptionError, WeightsError
 from ffhnet.model.config import ModelConfig
 from ffhnet.model.evaluator import FFHEvaluator
+from ffhnet.model.flow import FlowGenerator
 from ffhnet.model.generator import FFHGenerator
 
-FORMAT = 1
+Generator = FFHGenerator | FlowGenerator
+"""What proposes grasps."""
+
+FORMAT = 2
 CONFIG_FILE = "config.json"
 GENERATOR_FILE = "generator.safetensors"
 EVALUATOR_FILE = "evaluator.safetensors"
@@ -65,14 +69,14 @@ class Checkpoint:
     """A loaded checkpoint, both networks in evaluation mode."""
 
     info: CheckpointInfo
-    generator: FFHGenerator
+    generator: Generator
     evaluator: FFHEvaluator
 
 
 def save_checkpoint(
     folder: Path,
     info: CheckpointInfo,
-    generator: FFHGenerator | None = None,
+    generator: Generator | None = None,
     evaluator: FFHEvaluator | None = None,
     half: bool = False,
 ) -> None:
@@ -114,7 +118,9 @@ def load_checkpoint(folder: Path, hand: str | None = None, device: torch.device 
     info, digests = _read_config(folder)
     if hand is not None and hand != info.hand:
         raise WeightsError(f"wanted weights for hand {hand!r}, {folder} holds weights for {info.hand!r}")
-    generator, evaluator = FFHGenerator(info.model), FFHEvaluator(info.model)
+    generator: Generator
+    generator = FlowGenerator(info.model) if info.model.generator == "flow" else FFHGenerator(info.model)
+    evaluator = FFHEvaluator(info.model)
     for name, network in ((GENERATOR_FILE, generator), (EVALUATOR_FILE, evaluator)):
         _load_weights(folder / name, digests.get(name), network)
         network.to(device).eval()

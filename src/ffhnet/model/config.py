@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from ffhnet.errors import OptionError
 
@@ -22,10 +23,16 @@ class ModelConfig:
         position_scale: metres that count as 1 at the networks' inputs and outputs.
         joint_scale: radians that count as 1.
         height_scale: metres of table height that count as 1.
+        generator: FFHGenerator ("cvae", the paper's) or FlowGenerator ("flow").
         latent: size of the cVAE's latent vector.
         inner_width: width between the two layers of a ResBlock.
         width: output width of a ResBlock.
         dropout: dropout after each ResBlock of the evaluator.
+        palm_points: points around the hand at which evaluator and flow read the distance field, 0 for none.
+        judge_robustness: the evaluator also predicts success under varied physics, and start collisions.
+        flow_width: width of the flow's blocks.
+        flow_blocks: number of them.
+        flow_steps: steps from noise to grasp.
     """
 
     num_joints: int = 15
@@ -38,15 +45,26 @@ class ModelConfig:
     position_scale: float = 0.1
     joint_scale: float = 0.5
     height_scale: float = 0.1
+    generator: Literal["cvae", "flow"] = "flow"
     latent: int = 5
     inner_width: int = 256
     width: int = 512
     dropout: float = 0.3
+    palm_points: int = 96
+    judge_robustness: bool = True
+    flow_width: int = 384
+    flow_blocks: int = 4
+    flow_steps: int = 8
 
     def __post_init__(self) -> None:
-        sizes = (self.num_joints, self.bps_size, self.latent, self.inner_width, self.width)
+        widths = (self.inner_width, self.width, self.flow_width)
+        sizes = (self.num_joints, self.bps_size, self.latent, *widths, self.flow_blocks, self.flow_steps)
         if min(sizes) < 1:
             raise OptionError(f"all sizes of ModelConfig must be at least 1, got {sizes}")
+        if self.palm_points < 0:
+            raise OptionError(f"palm_points must be at least 0, got {self.palm_points}")
+        if self.generator not in ("cvae", "flow"):
+            raise OptionError(f"the generator is 'cvae' or 'flow', got {self.generator!r}")
         if self.pca_components is not None and not 1 <= self.pca_components <= self.bps_size:
             raise OptionError(
                 f"pca_components must lie between 1 and bps_size {self.bps_size}, got {self.pca_components}"
@@ -54,9 +72,10 @@ class ModelConfig:
 
     @classmethod
     def default(cls, num_joints: int = 15) -> ModelConfig:
-        """The project's own preset: BPS through a fixed PCA projection, table height, fixed input scales.
+        """The project's own preset.
 
-        Neighbouring BPS entries are nearly collinear, which makes the raw 4096 inputs slow to learn from.
+        BPS through a fixed PCA projection (neighbouring entries are nearly collinear, which makes the raw
+        4096 inputs slow to learn from), table height, distances around the hand, a flow as generator.
         """
         return cls(num_joints=num_joints)
 
@@ -71,6 +90,9 @@ class ModelConfig:
             skip_batch_norm=False,
             position_scale=1.0,
             joint_scale=1.0,
+            generator="cvae",
+            palm_points=0,
+            judge_robustness=False,
         )
 
     @property

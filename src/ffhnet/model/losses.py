@@ -6,6 +6,7 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional
 
+from ffhnet.model.evaluator import EvaluatorLogits
 from ffhnet.model.generator import LatentGaussian
 from ffhnet.model.tensors import GraspTensors
 
@@ -48,6 +49,24 @@ def generator_loss(predicted: GraspTensors, wanted: GraspTensors, latent: Latent
     )
 
 
-def evaluator_loss(logits: Float[Tensor, "V G"], label: Float[Tensor, "V G"]) -> Float[Tensor, ""]:
-    """Binary cross-entropy (Eq. 5); labels may be probabilities."""
-    return functional.binary_cross_entropy_with_logits(logits, label)
+def evaluator_loss(
+    logits: EvaluatorLogits,
+    success: Float[Tensor, "V G"],
+    robust: Float[Tensor, "V G"],
+    collision: Float[Tensor, "V G"],
+) -> Float[Tensor, ""]:
+    """Binary cross-entropy (Eq. 5) of success, and of robustness and collision where the model predicts them.
+
+    Args:
+        logits: of each grasp.
+        success: labels in nominal physics; they may be probabilities.
+        robust: labels under varied physics; NaN where a grasp was not repeated.
+        collision: 1 where the start collided.
+    """
+    total = functional.binary_cross_entropy_with_logits(logits.success, success)
+    if logits.robust is not None and logits.collision is not None:
+        total = total + functional.binary_cross_entropy_with_logits(logits.collision, collision)
+        known = ~robust.isnan()
+        if known.any():
+            total = total + functional.binary_cross_entropy_with_logits(logits.robust[known], robust[known])
+    return total

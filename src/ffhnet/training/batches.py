@@ -28,15 +28,31 @@ ANY, SUCCESS, FAILURE, COLLISION, HARD_NEGATIVE = range(5)
 
 @dataclass(frozen=True)
 class Batch:
-    """What one training step sees."""
+    """What one training step sees.
+
+    Attributes:
+        objects: V views.
+        grasps: G grasps of each view's placement, in its view frame.
+        label: success in nominal physics.
+        robust: success under varied physics; NaN where unknown.
+        collision: 1 where the start collided.
+    """
 
     objects: ObjectTensors
     grasps: GraspTensors
     label: Float[Tensor, "V G"]
+    robust: Float[Tensor, "V G"]
+    collision: Float[Tensor, "V G"]
 
     def to(self, device: torch.device) -> Batch:
         """The same on another device."""
-        return Batch(self.objects.to(device), self.grasps.to(device), self.label.to(device))
+        return Batch(
+            self.objects.to(device),
+            self.grasps.to(device),
+            self.label.to(device),
+            self.robust.to(device),
+            self.collision.to(device),
+        )
 
 
 class BatchMaker:
@@ -142,6 +158,8 @@ class BatchMaker:
             objects=ObjectTensors(_tensor(data.bps[view]), _tensor(data.table_height[view])),
             grasps=GraspTensors(_tensor(rotation), _tensor(position), _tensor(data.joints[trial])),
             label=_tensor(label),
+            robust=_tensor(np.where(moved, np.nan, data.robust[trial])),
+            collision=_tensor(np.where(moved, 0.0, ~data.executed[trial])),
         )
 
 

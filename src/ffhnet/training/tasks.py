@@ -12,6 +12,7 @@ from ffhnet.dataset.training_data import TrainingData
 from ffhnet.geometry.rotations import geodesic_angle
 from ffhnet.metrics import auroc, binary_cross_entropy, expected_calibration_error
 from ffhnet.model.evaluator import FFHEvaluator
+from ffhnet.model.flow import FlowGenerator
 from ffhnet.model.generator import FFHGenerator
 from ffhnet.model.losses import evaluator_loss, generator_loss, kl_divergence
 from ffhnet.training.batches import Batch, BatchMaker
@@ -19,6 +20,9 @@ from ffhnet.training.config import TrainingConfig
 
 HELD_OUT_VIEWS, HELD_OUT_GRASPS, HELD_OUT_SEED = 128, 64, 20
 """Size and seed of the fixed batch on which metrics are measured."""
+
+TIME_SPREAD = 1.2
+"""Standard deviation of the logit of the flow times that are trained."""
 
 
 class Task(Protocol):
@@ -67,6 +71,45 @@ class GeneratorTask:
         return {} if self._held_out is None else generator_metrics(self.module, self._held_out)
 
 
+class FlowTask:
+    """Carry noise to successful grasps along straight paths."""
+
+    def __init__(
+        self, module: FlowGenerator, config: TrainingConfig, data: TrainingData, held_out: TrainingData | None
+    ):
+        self.module = module
+        self.config = config
+        self._device = next(module.parameters()).device
+        self._batches = BatchMaker.for_generator(data, config.min_local_success, config.min_margin)
+        self._held_out = None
+        if held_out is not None:
+            self._held_out = _held_out_batch(BatchMaker.for_generator(held_out), self._device)
+
+    def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
+        """Flow matching loss of one batch; noise and times come from torch's global generator."""
+        batch = self._batches.draw(rng, self.config.views, self.config.grasps).to(self._device)
+        total = self._loss(batch)
+        return total, {"loss": total.item()}
+
+    def metrics(self) -> dict[str, float]:
+        """The same loss on held-out successes."""
+        if self._held_out is None:
+            return {}
+        self.module.eval()
+        with torch.inference_mode(), torch.random.fork_rng():
+            torch.manual_seed(HELD_OUT_SEED)
+            value = self._loss(self._held_out).item()
+        self.module.train()
+        return {"velocity_error": value}
+
+    def _loss(self, batch: Batch) -> Tensor:
+        shape = batch.label.shape
+        noise = torch.randn(*shape, self.module.state_width, device=self._device)
+        # A logistic normal spends more steps where noise and grasp mix than at the ends.
+        time = torch.sigmoid(TIME_SPREAD * torch.randn(shape, device=self._device))
+        return self.module.loss(batch.objects, batch.grasps, noise, time)
+
+
 class EvaluatorTask:
     """Predict the success of grasps of all kinds (Eq. 5)."""
 
@@ -84,7 +127,8 @@ class EvaluatorTask:
     def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         """Eq. 5 on one batch."""
         batch = self._batches.draw(rng, self.config.views, self.config.grasps).to(self._device)
-        total = evaluator_loss(self.module(batch.objects, batch.grasps), batch.label)
+        logits = self.module(batch.objects, batch.grasps)
+        total = evaluator_loss(logits, batch.label, batch.robust, batch.collision)
         return total, {"loss": total.item()}
 
     def metrics(self) -> dict[str, float]:
@@ -116,7 +160,7 @@ def evaluator_metrics(module: FFHEvaluator, batch: Batch) -> dict[str, float]:
     """AUROC, cross-entropy and expected calibration error of the predicted probabilities."""
     module.eval()
     with torch.inference_mode():
-        probability = torch.sigmoid(module(batch.objects, batch.grasps)).flatten().cpu().numpy()
+        probability = torch.sigmoid(module(batch.objects, batch.grasps).success).flatten().cpu().numpy()
     module.train()
     label = batch.label.flatten().cpu().numpy()
     return {

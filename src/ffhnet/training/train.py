@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-import torch
+import numpy as np
+from jaxtyping import Float
+from torch import nn
 
 from ffhnet.dataset.training_data import TrainingData
-from ffhnet.errors import DatasetError
-from ffhnet.model.checkpoint import CheckpointInfo, save_checkpoint
+from ffhnet.errors import DatasetError, OptionError, WeightsError
+from ffhnet.model.checkpoint import CheckpointInfo, Generator, save_checkpoint
 from ffhnet.model.config import ModelConfig
 from ffhnet.model.evaluator import FFHEvaluator
+from ffhnet.model.flow import FlowGenerator
 from ffhnet.model.generator import FFHGenerator
 from ffhnet.model.pca import fit_projection
+from ffhnet.training.batches import BatchMaker
 from ffhnet.training.config import TrainingConfig
 from ffhnet.training.loop import fit, seeded
-from ffhnet.training.tasks import EvaluatorTask, GeneratorTask
+from ffhnet.training.processes import ALONE, Processes
+from ffhnet.training.tasks import EvaluatorTask, FlowTask, GeneratorTask, Task
 
-Network = TypeVar("Network", FFHGenerator, FFHEvaluator)
+Network = TypeVar("Network", FFHGenerator, FlowGenerator, FFHEvaluator)
+
+STATISTICS_VIEWS, STATISTICS_GRASPS = 256, 32
+"""Size of the batch from which a flow takes mean and deviation of its state."""
 
 
 def train_generator(
@@ -29,11 +38,12 @@ def train_generator(
     config: TrainingConfig,
     out_dir: Path,
     joint_limits: tuple[Sequence[float], Sequence[float]],
-    start: FFHGenerator | None = None,
-    device: torch.device | str = "cpu",
+    palm_points: Float[np.ndarray, "K 3"] | None = None,
+    start: Generator | None = None,
     progress: bool = True,
-) -> FFHGenerator:
-    """Train an FFHGenerator on the successes in `data` and write it to `out_dir`.
+    processes: Processes = ALONE,
+) -> Generator:
+    """Train the generator of `config.model` on the successes in `data` and write it to `out_dir`.
 
     Args:
         data: training views and trials.
@@ -41,19 +51,30 @@ def train_generator(
         config: architecture and run.
         out_dir: gets the checkpoint, a log and a state file; an interrupted run goes on from the latter.
         joint_limits: lower and upper limits in radians, in the order of `data.joint_names`.
+        palm_points: where around the hand the networks look (m, palm frame), for models that do.
         start: network to go on from instead of random weights; it is not changed.
-        device: where to train.
         progress: show a progress bar.
+        processes: those that train this network together, and where; each calls this with the same
+            arguments, draws its part of the batch, and gets the same network. Process 0 writes.
 
     Raises:
         DatasetError: nothing to train on, or data of another hand or with other sizes than the model's.
         WeightsError: `out_dir` holds a run with another configuration.
     """
     _check_data(data, config.model)
-    module = _initial(FFHGenerator, data, config, start).to(device)
-    metrics = fit(GeneratorTask(module, config, data, val), config, out_dir, "generator", progress)
-    info = _info(data, config, joint_limits, "generator", metrics)
-    save_checkpoint(out_dir, info, generator=module, half=True)
+    part = dataclasses.replace(config, views=processes.share(config.views))
+    task: Task
+    module: Generator
+    if config.model.generator == "flow":
+        module = _initial(FlowGenerator, data, config, start, palm_points).to(processes.device)
+        task = FlowTask(module, part, data, val)
+    else:
+        module = _initial(FFHGenerator, data, config, start, palm_points).to(processes.device)
+        task = GeneratorTask(module, part, data, val)
+    metrics = fit(task, config, out_dir, "generator", progress, processes)
+    if processes.first:
+        info = _info(data, config, joint_limits, "generator", metrics)
+        save_checkpoint(out_dir, info, generator=module, half=True)
     return module
 
 
@@ -63,28 +84,49 @@ def train_evaluator(
     config: TrainingConfig,
     out_dir: Path,
     joint_limits: tuple[Sequence[float], Sequence[float]],
+    palm_points: Float[np.ndarray, "K 3"] | None = None,
     start: FFHEvaluator | None = None,
-    device: torch.device | str = "cpu",
     progress: bool = True,
+    processes: Processes = ALONE,
 ) -> FFHEvaluator:
     """Train an FFHEvaluator on all trials in `data` and write it to `out_dir`; else as `train_generator`."""
     _check_data(data, config.model)
-    module = _initial(FFHEvaluator, data, config, start).to(device)
-    metrics = fit(EvaluatorTask(module, config, data, val), config, out_dir, "evaluator", progress)
-    info = _info(data, config, joint_limits, "evaluator", metrics)
-    save_checkpoint(out_dir, info, evaluator=module, half=True)
+    module = _initial(FFHEvaluator, data, config, start, palm_points).to(processes.device)
+    part = dataclasses.replace(config, views=processes.share(config.views))
+    metrics = fit(EvaluatorTask(module, part, data, val), config, out_dir, "evaluator", progress, processes)
+    if processes.first:
+        info = _info(data, config, joint_limits, "evaluator", metrics)
+        save_checkpoint(out_dir, info, evaluator=module, half=True)
     return module
 
 
 def _initial(
-    kind: type[Network], data: TrainingData, config: TrainingConfig, start: Network | None
+    kind: type[Network],
+    data: TrainingData,
+    config: TrainingConfig,
+    start: nn.Module | None,
+    palm_points: Float[np.ndarray, "K 3"] | None,
 ) -> Network:
+    """The network to begin with; what is fixed during training is fitted to the data."""
     if start is not None:
+        if not isinstance(start, kind):
+            raise WeightsError(f"wanted to go on from a {kind.__name__}, got a {type(start).__name__}")
         return copy.deepcopy(start)
     with seeded(config.seed):
         module = kind(config.model)
     if config.model.pca_components is not None:
         module.condition.set_projection(fit_projection(data.bps, config.model.pca_components))
+    geometry = None if isinstance(module, FFHGenerator) else module.geometry
+    if geometry is not None:
+        if palm_points is None:
+            raise OptionError(
+                f"this model looks at {config.model.palm_points} points around the palm, got none"
+            )
+        geometry.set_points(palm_points)
+    if isinstance(module, FlowGenerator):
+        batches = BatchMaker.for_generator(data, config.min_local_success, config.min_margin)
+        rng = np.random.default_rng(config.seed)
+        module.set_statistics(batches.draw(rng, STATISTICS_VIEWS, STATISTICS_GRASPS).grasps)
     return module
 
 

@@ -1,0 +1,149 @@
+"""A generator of grasps by flow matching: noise is carried to a grasp along a learned velocity field.
+
+Conditional flow matching with straight paths (Lipman et al. 2023, Liu et al. 2023). Where the cVAE blurs a
+grasp by what its latent vector cannot hold, the flow looks again at the object at every step: at the distance
+field around the palm pose reached so far.
+"""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+from torch.nn import functional
+
+from ffhnet.geometry.rotations import rotation_from_6d, rotation_to_6d
+from ffhnet.model.condition import ObjectCondition
+from ffhnet.model.config import ModelConfig
+from ffhnet.model.local_geometry import local_geometry
+from ffhnet.model.tensors import GraspTensors, ObjectTensors
+
+TIME_FREQUENCIES = 16
+MAX_FREQUENCY = 100.0
+"""rad per unit of flow time (0 is noise, 1 is a grasp)."""
+
+CONDITION_WIDTH = 256
+
+
+class FlowBlock(nn.Module):
+    """A residual block whose normalised input is scaled and shifted by object and time."""
+
+    def __init__(self, width: int):
+        super().__init__()
+        self.norm = nn.LayerNorm(width)
+        self.modulation = nn.Linear(CONDITION_WIDTH, 2 * width)
+        self.first = nn.Linear(width, width)
+        self.second = nn.Linear(width, width)
+        nn.init.zeros_(self.second.weight)
+        nn.init.zeros_(self.second.bias)
+
+    def forward(self, x: Float[Tensor, "V G F"], context: Float[Tensor, "V G C"]) -> Float[Tensor, "V G F"]:
+        """The input plus what the block makes of it."""
+        scale, shift = self.modulation(context).chunk(2, dim=-1)
+        return x + self.second(functional.silu(self.first(self.norm(x) * (1 + scale) + shift)))
+
+
+class FlowGenerator(nn.Module):
+    """Maps an object and noise x ~ N(0, I) to a grasp by integrating dx/dt = v(x, t | object) from 0 to 1.
+
+    The state x holds the palm's rotation (6-D), position and joint angles, each entry standardised over
+    the training grasps.
+    """
+
+    mean: Tensor
+    deviation: Tensor
+    frequency: Tensor
+
+    def __init__(self, config: ModelConfig):
+        super().__init__()
+        self.config = config
+        self.state_width = 9 + config.num_joints
+        self.condition = ObjectCondition(config)
+        self.geometry = local_geometry(config)
+        local = 0 if self.geometry is None else self.geometry.width
+        width = config.flow_width
+        self.object_layer = nn.Linear(config.condition_width, CONDITION_WIDTH)
+        self.object_second = nn.Linear(CONDITION_WIDTH, CONDITION_WIDTH)
+        self.time_layer = nn.Linear(2 * TIME_FREQUENCIES, CONDITION_WIDTH)
+        self.first = nn.Linear(self.state_width + local, width)
+        self.blocks = nn.ModuleList(FlowBlock(width) for _ in range(config.flow_blocks))
+        self.head = nn.Linear(width, self.state_width)
+        nn.init.zeros_(self.head.weight)
+        self.register_buffer("mean", torch.zeros(self.state_width))
+        self.register_buffer("deviation", torch.ones(self.state_width))
+        frequency = torch.exp(torch.linspace(0, math.log(MAX_FREQUENCY), TIME_FREQUENCIES))
+        self.register_buffer("frequency", frequency, persistent=False)
+
+    def set_statistics(self, grasps: GraspTensors) -> None:
+        """Take mean and deviation of the state's entries from training grasps."""
+        rows = self._raw(grasps).flatten(0, 1)
+        self.mean.copy_(rows.mean(dim=0))
+        self.deviation.copy_(rows.std(dim=0).clamp(min=1e-3))
+
+    def loss(
+        self,
+        objects: ObjectTensors,
+        grasps: GraspTensors,
+        noise: Float[Tensor, "V G S"],
+        time: Float[Tensor, "V G"],
+    ) -> Float[Tensor, ""]:
+        """Mean square error of the velocity at a time along the straight path from noise to grasp."""
+        grasp = (self._raw(grasps) - self.mean) / self.deviation
+        t = time.unsqueeze(-1)
+        view = self._look(objects)
+        return functional.mse_loss(self._velocity(view, (1 - t) * noise + t * grasp, time), grasp - noise)
+
+    def sample(self, objects: ObjectTensors, num: int, source: torch.Generator) -> GraspTensors:
+        """`num` grasps for each view by `flow_steps` Euler steps; joint angles are not clipped.
+
+        Args:
+            objects: V views.
+            num: grasps per view.
+            source: of the noise, on the CPU.
+        """
+        views, device = len(objects.bps), objects.bps.device
+        x = torch.randn(views, num, self.state_width, generator=source).to(device)
+        view = self._look(objects)
+        steps = self.config.flow_steps
+        for step in range(steps):
+            time = torch.full((views, num), step / steps, device=device)
+            x = x + self._velocity(view, x, time) / steps
+        return self._grasps(x)
+
+    def _raw(self, grasps: GraspTensors) -> Float[Tensor, "V G S"]:
+        position = grasps.position / self.config.position_scale
+        joints = grasps.joints / self.config.joint_scale
+        return torch.cat([rotation_to_6d(grasps.rotation), position, joints], dim=-1)
+
+    def _grasps(self, x: Float[Tensor, "V G S"]) -> GraspTensors:
+        raw = x * self.deviation + self.mean
+        return GraspTensors(
+            rotation=rotation_from_6d(raw[..., :6]),
+            position=raw[..., 6:9] * self.config.position_scale,
+            joints=raw[..., 9:] * self.config.joint_scale,
+        )
+
+    def _look(self, objects: ObjectTensors) -> tuple[ObjectTensors, Tensor, Tensor | None]:
+        """What all steps share: the objects, their embedding and their distance fields."""
+        embedded = self.object_second(functional.silu(self.object_layer(self.condition(objects))))
+        return objects, embedded, None if self.geometry is None else self.geometry.field(objects.bps)
+
+    def _velocity(
+        self,
+        view: tuple[ObjectTensors, Tensor, Tensor | None],
+        x: Float[Tensor, "V G S"],
+        time: Float[Tensor, "V G"],
+    ) -> Float[Tensor, "V G S"]:
+        objects, embedded, grid = view
+        angle = time.unsqueeze(-1) * self.frequency
+        clock = self.time_layer(torch.cat([angle.sin(), angle.cos()], dim=-1))
+        context = functional.silu(embedded.unsqueeze(1) + clock)
+        seen = x
+        if self.geometry is not None and grid is not None:
+            seen = torch.cat([x, self.geometry(grid, objects, self._grasps(x))], dim=-1)
+        hidden = self.first(seen)
+        for block in self.blocks:
+            hidden = block(hidden, context)
+        return self.head(hidden)
