@@ -6,7 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ffhnet.errors import OptionError
-from ffhnet.metrics import auroc, binary_cross_entropy, expected_calibration_error, wilson_interval
+from ffhnet.metrics import (
+    auroc,
+    binary_cross_entropy,
+    expected_calibration_error,
+    reliability,
+    wilson_interval,
+)
 
 pairs = st.lists(st.tuples(st.booleans(), st.integers(0, 5)), min_size=2, max_size=40)
 
@@ -64,6 +70,20 @@ def test_calibration_error_is_the_weighted_gap_per_bin():
         inside = (probability >= k / 10) & (probability < (k + 1) / 10)
         wanted += inside.mean() * abs(probability[inside].mean() - label[inside].mean())
     assert expected_calibration_error(label, probability) == pytest.approx(wanted)
+
+
+def test_reliability_counts_every_prediction_once():
+    rng = np.random.default_rng(0)
+    probability = np.append(rng.random(300), [0.0, 0.1, 0.9999, 1.0])
+    label = (rng.random(304) < probability).astype(float)
+    bins = reliability(label, probability, 5)
+    assert sum(b.count for b in bins) == 304
+    for b in bins:
+        inside = (probability >= b.low) & ((probability < b.high) | (b.high == 1))
+        assert b.count == inside.sum()
+        assert b.predicted == pytest.approx(probability[inside].mean())
+        assert b.observed == pytest.approx(label[inside].mean())
+    assert np.isnan(reliability(np.array([1.0]), np.array([0.05]))[5].observed)
 
 
 def test_calibration_error_extremes():

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ffhnet.evaluation import bootstrap
 from ffhnet.evaluation.outcomes import Tries, ViewOutcome
@@ -151,31 +152,31 @@ def best_of_each(drawn: Sequence[Drawn], share: float) -> Cell:
     return pool([count(d.tries[d.order[: round(share * len(d))]], total=len(d)) for d in drawn])
 
 
-def best_of_all(drawn: Sequence[Drawn], share: float) -> Cell:
-    """The best share of all samples together: easy objects give more of them."""
+def best_of_all(drawn: Sequence[Drawn], shares: Sequence[float]) -> list[Cell]:
+    """The best shares of all samples together: easy objects give more of them."""
     score = np.concatenate([d.score for d in drawn])
-    tries = Tries.join([d.tries for d in drawn])
-    owner = np.repeat(np.arange(len(drawn)), [len(d) for d in drawn])
     order = np.argsort(-score, kind="stable")
-    owner, tries = owner[order], tries[order]
-    best = count(tries[: round(share * len(score))], total=len(score))
-    if len(drawn) < 2:
-        return best
-    draws = bootstrap.object_draws(len(drawn))
-    rates = np.array([_best_in_draw(draw[owner], tries, share) for draw in draws])
-    return Cell(
-        best.kept,
-        best.successes,
-        best.collisions,
-        best.total,
-        bootstrap.interval(rates[:, 0], len(drawn)),
-        bootstrap.interval(rates[:, 1], len(drawn)),
+    owner = np.repeat(np.arange(len(drawn)), [len(d) for d in drawn])[order]
+    tries = Tries.join([d.tries for d in drawn])[order]
+    draws = bootstrap.object_draws(len(drawn)) if len(drawn) > 1 else np.zeros((0, 1), dtype=int)
+    # D × 2 × S: rates with and without start collisions.
+    rates = np.array([_best_rates(draw[owner], tries, shares) for draw in draws]).reshape(-1, 2, len(shares))
+    cells = []
+    for i, share in enumerate(shares):
+        best = count(tries[: round(share * len(score))], total=len(score))
+        with_collisions, without = (bootstrap.interval(rates[:, k, i], len(drawn)) for k in range(2))
+        cells.append(dataclasses.replace(best, interval=with_collisions, interval_executed=without))
+    return cells
+
+
+def _best_rates(
+    weight: Int[np.ndarray, " N"], tries: Tries, shares: Sequence[float]
+) -> Float[np.ndarray, "2 S"]:
+    """Success of the best shares where each sample occurs `weight` times, with and without collisions."""
+    kept, successes, executed = (
+        np.concatenate([[0], np.cumsum(weight * column)]) for column in (1, tries.success, tries.executed)
     )
-
-
-def _best_in_draw(weight: np.ndarray, tries: Tries, share: float) -> tuple[float, float]:
-    """Rate of the best share, with and without collisions, where each sample occurs `weight` times."""
-    end = int(np.searchsorted(np.cumsum(weight), round(share * weight.sum()), side="right"))
-    weight = weight[:end]
-    successes, kept, executed = weight @ tries.success[:end], weight.sum(), weight @ tries.executed[:end]
-    return successes / kept if kept else np.nan, successes / executed if executed else np.nan
+    wanted = [round(share * kept[-1]) for share in shares]
+    ends = np.searchsorted(kept, wanted, side="right") - 1
+    with np.errstate(invalid="ignore"):
+        return successes[ends] / np.stack([kept[ends], executed[ends]])

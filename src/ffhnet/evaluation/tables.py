@@ -241,7 +241,8 @@ def make_row(name: str, outcomes: Sequence[ViewOutcome]) -> Row:
             for threshold in THRESHOLDS
         ),
         kept=tuple(
-            KeptShare(share, best_of_all(drawn, share), best_of_each(drawn, share)) for share in KEPT_SHARES
+            KeptShare(share, everywhere, best_of_each(drawn, share))
+            for share, everywhere in zip(KEPT_SHARES, best_of_all(drawn, KEPT_SHARES), strict=True)
         ),
         heuristic=pool([_count_all(views, lambda view: view.heuristic) for views in objects]),
         conditions=tuple(_condition_cells(objects, i, n) for i, n in enumerate(names)),
