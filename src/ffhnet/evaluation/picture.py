@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -163,27 +164,34 @@ def _grasp_panel(
     return _Panel(
         surfaces=[cloud.surface, *parts, *axes],
         points=points,
-        azimuth=_OBSERVER + _clearest_side(cloud, parts, points, sides),
+        azimuth=clearest_azimuth(cloud.surface, parts, points, [_OBSERVER + side for side in sides]),
         caption=f"{name}   p = {grasps.probability[index]:.2f}",
     )
 
 
-def _clearest_side(
-    cloud: _Cloud, parts: list[Surface], points: Float[np.ndarray, "N 3"], sides: tuple[float, ...]
+def clearest_azimuth(
+    thing: Surface, parts: list[Surface], points: Float[np.ndarray, "N 3"], azimuths: Sequence[float]
 ) -> float:
-    """The side from which much of the observed points and much of the fingers is seen."""
-    scene = RayScene([cloud.surface.mesh, *(part.mesh for part in parts)])
+    """The side from which much of a thing and much of the fingers at it is seen.
+
+    Args:
+        thing: a cloud or an object.
+        parts: of the hand, as `hand_surfaces` gives them.
+        points: that fill the picture.
+        azimuths: to choose from, degrees as in `camera_around`.
+    """
+    scene = RayScene([thing.mesh, *(part.mesh for part in parts)])
     fingers = [1 + i for i, part in enumerate(parts) if part.color is not PALM]
     camera = square_camera(64)
     x, y = np.meshgrid(*camera.rays())
     directions = np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3)
 
-    def seen(side: float) -> int:
-        T_view_camera = camera_around(points, _OBSERVER + side, _ELEVATION, camera)
+    def seen(azimuth: float) -> int:
+        T_view_camera = camera_around(points, azimuth, _ELEVATION, camera)
         hits = scene.cast(T_view_camera[None, :3, 3], directions @ T_view_camera[:3, :3].T)
         return int((1 + (hits.mesh == 0).sum()) * (1 + np.isin(hits.mesh, fingers).sum()))
 
-    return max(sides, key=seen)
+    return max(azimuths, key=seen)
 
 
 def _palms_panel(cloud: _Cloud, grasps: Grasps) -> _Panel:
