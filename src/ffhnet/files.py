@@ -62,8 +62,8 @@ def remove_unfinished(folder: Path, suffix: str) -> None:
 
 
 @contextlib.contextmanager
-def only_writer(folder: Path) -> Iterator[bool]:
-    """Holds the lock of a folder, a file in it; gives whether it could be held.
+def only_writer(folder: Path, lock: str = ".lock") -> Iterator[bool]:
+    """Holds the lock of a folder, a file `lock` in it; gives whether it could be held.
 
     The operating system takes the lock back when the process ends, however it ends: it is never stale. Some
     systems (Windows) and file systems have no such locks.
@@ -71,7 +71,7 @@ def only_writer(folder: Path) -> Iterator[bool]:
     Raises:
         BlockingIOError: another process holds it.
     """
-    with (folder / ".lock").open("w") as file:
+    with (folder / lock).open("w") as file:
         yield _lock(file)
 
 

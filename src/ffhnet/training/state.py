@@ -1,9 +1,8 @@
-"""The state of a run, written so that a killed run resumes to the same weights; and its log."""
+"""The state of a run, from which a killed run resumes to the same weights; and its log."""
 
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 
 import safetensors
@@ -14,13 +13,10 @@ from torch import Tensor, nn
 from ffhnet.errors import WeightsError
 
 
-def save_state(
-    path: Path, step: int, identity: str, module: nn.Module, optimizer: torch.optim.Optimizer
-) -> None:
-    """Write weights and optimiser moments after `step` steps; a kill while writing leaves the old file.
+def pack_state(step: int, identity: str, module: nn.Module, optimizer: torch.optim.Optimizer) -> bytes:
+    """Weights and optimiser moments after `step` steps as the content of a safetensors file.
 
     Args:
-        path: file to replace.
         step: steps done.
         identity: text that must be the same when resuming, such as the training configuration.
         module: network in training.
@@ -29,27 +25,33 @@ def save_state(
     tensors = {f"module/{name}": tensor for name, tensor in module.state_dict().items()}
     for index, moments in optimizer.state_dict()["state"].items():
         tensors |= {f"optimizer/{index}/{name}": tensor for name, tensor in moments.items()}
-    content = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
-    fresh = path.with_name(path.name + ".new")
-    safetensors.torch.save_file(content, fresh, metadata={"step": str(step), "identity": identity})
-    os.replace(fresh, path)
+    tensors["run/step"] = torch.tensor(step)
+    # As a tensor, since safetensors gives metadata only of files, and this also goes between processes.
+    tensors["run/identity"] = torch.frombuffer(bytearray(identity.encode()), dtype=torch.uint8)
+    return safetensors.torch.save({name: t.detach().cpu().contiguous() for name, t in tensors.items()})
 
 
-def load_state(path: Path, identity: str, module: nn.Module, optimizer: torch.optim.Optimizer) -> int:
-    """Take up weights and moments; returns the steps done, 0 where there is no file.
+def unpack_state(
+    content: bytes, path: Path, identity: str, module: nn.Module, optimizer: torch.optim.Optimizer
+) -> int:
+    """Take up weights and moments; returns the steps done.
+
+    Args:
+        content: what `pack_state` made.
+        path: where it came from, for errors.
+        identity: as passed to `pack_state`.
+        module: network to fill.
+        optimizer: optimiser to fill.
 
     Raises:
-        WeightsError: the file is damaged or belongs to a run with another configuration.
+        WeightsError: the content is damaged or belongs to a run with another configuration.
     """
-    if not path.exists():
-        return 0
     try:
-        with safetensors.safe_open(path, framework="pt") as file:
-            metadata = file.metadata() or {}
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    except safetensors.SafetensorError as error:
+        tensors = safetensors.torch.load(content)
+        step, came = int(tensors.pop("run/step")), tensors.pop("run/identity")
+    except (safetensors.SafetensorError, KeyError) as error:
         raise WeightsError(f"{path} is damaged, remove it to start afresh: {error}") from error
-    if metadata.get("identity") != identity:
+    if bytes(came.numpy()) != identity.encode():
         raise WeightsError(f"{path} belongs to a run with another configuration: use another folder")
     weights: dict[str, Tensor] = {}
     moments: dict[int, dict[str, Tensor]] = {}
@@ -63,7 +65,7 @@ def load_state(path: Path, identity: str, module: nn.Module, optimizer: torch.op
     module.load_state_dict(weights)
     groups = optimizer.state_dict()["param_groups"]
     optimizer.load_state_dict({"state": moments, "param_groups": groups})
-    return int(metadata["step"])
+    return step
 
 
 class JsonLog:
