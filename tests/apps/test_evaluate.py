@@ -16,9 +16,8 @@ def test_evaluation_of_one_object(ffhnet, untrained_weights, tmp_path):
     texts = []
     for workers in (1, 2):
         path = tmp_path / f"{workers}.json"
-        status, out, err = ffhnet(
-            *ARGUMENTS, "--weights", untrained_weights, "--workers", workers, "--json", path
-        )
+        files = ("--json", path) if workers == 1 else ("--json", path, "--html", tmp_path / "report.html")
+        status, out, err = ffhnet(*ARGUMENTS, "--weights", untrained_weights, "--workers", workers, *files)
         assert (status, err) == (0, "")
         texts.append(path.read_text())
     assert texts[0] == texts[1]
@@ -37,6 +36,9 @@ def test_evaluation_of_one_object(ffhnet, untrained_weights, tmp_path):
     assert conditions["strict"]["top"]["executed"] == 20
     for condition in conditions.values():
         assert condition["blind_random_yaw"]["executed"] == condition["blind_short_side"]["executed"] == 2
+    text = (tmp_path / "report.html").read_text()
+    assert "Strict protocol" in text
+    assert text.count("<img") == 3
 
 
 @pytest.mark.parametrize(

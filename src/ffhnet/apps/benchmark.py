@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
-import platform
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from ffhnet.apps.console import absent, print_table, progress_bar
 from ffhnet.apps.extras import require_sim
+from ffhnet.apps.machine import describe_machine
 from ffhnet.errors import OptionError
 
 if TYPE_CHECKING:
@@ -46,7 +45,6 @@ class BenchmarkOptions:
 def run(options: BenchmarkOptions) -> None:
     """Measure and print."""
     require_sim("benchmark")
-    import mujoco
 
     from ffhnet.dataset.executors import run_jobs
     from ffhnet.dataset.object_trials import GenerateConfig
@@ -76,12 +74,7 @@ def run(options: BenchmarkOptions) -> None:
     _print(measured, figures)
     if options.json is not None:
         report = {
-            "machine": {
-                "architecture": platform.machine(),
-                "cores": os.cpu_count(),
-                "python": platform.python_version(),
-                "mujoco": mujoco.__version__,
-            },
+            "machine": describe_machine(),
             "mix": {
                 "objects": options.objects,
                 "first": options.first,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from ffhnet.apps.console import absent, progress_bar
+from ffhnet.apps.console import absent, busy, progress_bar
 from ffhnet.apps.extras import require_sim
 from ffhnet.errors import OptionError
 
@@ -48,6 +48,8 @@ class EvaluateOptions:
     """Seed of views and samples."""
     json: Annotated[Path | None, absent("FILE")] = None
     """Write all counts, intervals and the protocol to this file."""
+    html: Annotated[Path | None, absent("FILE")] = None
+    """Write a report with tables, charts and the paper's figures to this file, which needs nothing else."""
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)
     """Processes; the result does not depend on their number."""
 
@@ -58,26 +60,36 @@ def run(options: EvaluateOptions) -> None:
     import dataclasses
 
     from ffhnet.apps.evaluation_tables import print_evaluation
+    from ffhnet.apps.machine import describe_machine
+    from ffhnet.evaluation.figures import draw_figures
     from ffhnet.evaluation.outcomes import ViewOutcome
     from ffhnet.evaluation.protocol import view_jobs
+    from ffhnet.evaluation.report import report
     from ffhnet.evaluation.tables import make_table
     from ffhnet.files import check_output, write_atomically
     from ffhnet.objects.catalogue import resolve_objects
 
     _check(options)
-    if options.json is not None:
-        check_output(options.json, (".json",))
+    for path, suffix in ((options.json, ".json"), (options.html, ".html")):
+        if path is not None:
+            check_output(path, (suffix,))
     protocol = _protocol(options)
-    found = _evaluate(view_jobs(resolve_objects(options.objects), protocol), options.workers)
+    sources = resolve_objects(options.objects)
+    found = _evaluate(view_jobs(sources, protocol), options.workers)
     outcomes = [view for view in found if isinstance(view, ViewOutcome)]
     unseen = [view for view in found if not isinstance(view, ViewOutcome)]
     if not outcomes:
         raise OptionError(f"none of the {len(unseen)} views shows an object that can be told from the table")
     table = make_table(outcomes, unseen)
     print_evaluation(table)
+    described = {**dataclasses.asdict(protocol), "objects": options.objects}
     if options.json is not None:
-        described = {**dataclasses.asdict(protocol), "objects": options.objects}
         write_atomically(options.json, table.to_json(described).encode())
+    if options.html is not None:
+        with busy("drawing the report"):
+            figures = draw_figures(outcomes, {source.name: source.load for source in sources})
+            text = report(table, described, describe_machine(), figures)
+        write_atomically(options.html, text.encode())
 
 
 def _check(options: EvaluateOptions) -> None:

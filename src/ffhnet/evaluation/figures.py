@@ -14,7 +14,7 @@ from ffhnet.evaluation.picture import clearest_azimuth
 from ffhnet.evaluation.render import Surface, camera_around, render, square_camera
 from ffhnet.evaluation.shapes import approach_arrows, cloud_surface, color_scale, hand_surfaces
 from ffhnet.geometry.transforms import make_transform
-from ffhnet.hands import Hand
+from ffhnet.hands import Hand, load_hand
 from ffhnet.objects.grasp_object import GraspObject
 
 LIKELY = 0.75
@@ -74,15 +74,15 @@ def choose_views(views: Sequence[ViewOutcome], count: int) -> list[ViewOutcome]:
 
 
 def draw_figures(
-    views: Sequence[ViewOutcome], objects: Mapping[str, Callable[[], GraspObject]], hand: Hand
+    views: Sequence[ViewOutcome], objects: Mapping[str, Callable[[], GraspObject]]
 ) -> dict[str, Image.Image]:
     """All figures by the paper's number; none without a full view.
 
     Args:
-        views: of the evaluation.
+        views: of the evaluation, all of the same hand.
         objects: builds each object by its name.
-        hand: whose grasps they are.
     """
+    hand = load_hand(views[0].samples.grasps.hand)
     drawn = {"5": figure5(views, objects), "6": figure6(views, objects, hand), "7": figure7(views, hand)}
     return {number: image for number, image in drawn.items() if image is not None}
 

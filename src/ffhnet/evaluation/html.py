@@ -15,7 +15,7 @@ STYLE = """
 :root { --ink: #1c222c; --faint: #5c6673; --line: #d9dee5; --wash: #f5f7f9; }
 * { box-sizing: border-box; }
 body { font: 15px/1.5 system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif;
-  color: var(--ink); background: #fff; margin: 0 auto; padding: 32px 24px 64px; max-width: 1120px; }
+  color: var(--ink); background: #fff; margin: 0 auto; padding: 32px 24px 64px; max-width: 1180px; }
 h1 { font-size: 26px; line-height: 1.25; margin: 0 0 4px; font-weight: 650; }
 h2 { font-size: 18px; margin: 44px 0 6px; padding-top: 14px; border-top: 1px solid var(--line); }
 h3 { font-size: 15px; margin: 22px 0 4px; }
@@ -29,7 +29,7 @@ svg text.faint { fill: #5c6673; }
 div.scroll { overflow-x: auto; }
 table { border-collapse: collapse; margin: 10px 0 6px; font-size: 13px; font-variant-numeric: tabular-nums; }
 caption { text-align: left; padding-bottom: 4px; }
-th, td { padding: 4px 10px; text-align: right; white-space: nowrap; border-bottom: 1px solid var(--line); }
+th, td { padding: 4px 8px; text-align: right; white-space: nowrap; border-bottom: 1px solid var(--line); }
 th { font-weight: 600; vertical-align: bottom; background: var(--wash); }
 th:first-child, td:first-child { text-align: left; }
 td small { color: var(--faint); margin-left: 5px; }

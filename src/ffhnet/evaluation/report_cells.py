@@ -58,24 +58,20 @@ def executed_cell(cell: Cell) -> str | Element:
     )
 
 
-def number_cell(estimate: Estimate, form: str = ".3f") -> str | Element:
-    """A figure and its interval."""
+def number_cell(estimate: Estimate, form: str = ".3f", scale: float = 1.0) -> str | Element:
+    """A figure and its interval, both times `scale`."""
     if math.isnan(estimate.value):
         return "-"
-    text = format(estimate.value, form)
+    text = format(scale * estimate.value, form)
     if estimate.interval is None:
         return text
-    low, high = (format(end, form) for end in (estimate.interval.low, estimate.interval.high))
-    return element("td", text, element("small", f"{low} to {high}"))
+    low, high = (format(scale * end, form) for end in (estimate.interval.low, estimate.interval.high))
+    return element("td", text, element("small", f"{low} to {high}"), class_="tall")
 
 
-def points(lead: Estimate) -> str:
-    """A lead in points and its interval."""
-    if math.isnan(lead.value):
-        return "-"
-    bounds = lead.interval
-    tail = "" if bounds is None else f" ({100 * bounds.low:+.1f} to {100 * bounds.high:+.1f})"
-    return f"{100 * lead.value:+.1f}{tail}"
+def points_cell(lead: Estimate) -> str | Element:
+    """A difference of rates in points, and its interval."""
+    return number_cell(lead, "+.1f", 100.0)
 
 
 def percent(rate: float) -> str:
