@@ -30,8 +30,8 @@ CAPTIONS = {
         "saw."
     ),
     "6": (
-        "The best-ranked top grasp (first row) and side grasp (second row) that held, on each object. The "
-        "hand is drawn at the grasp's joint angles, from which the fingers close on until contact."
+        "The best-ranked top grasp and, below it, side grasp that held, on each object. The hand is drawn at "
+        "the grasp's joint angles, from which the fingers close on until contact."
     ),
     "7": (
         "The side grasp (first row) and top grasp (second row) with the highest predicted probability, on "

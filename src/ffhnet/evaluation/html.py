@@ -30,19 +30,23 @@ div.scroll { overflow-x: auto; }
 table { border-collapse: collapse; margin: 10px 0 6px; font-size: 13px; font-variant-numeric: tabular-nums; }
 caption { text-align: left; padding-bottom: 4px; }
 th, td { padding: 4px 8px; text-align: right; white-space: nowrap; border-bottom: 1px solid var(--line); }
-th { font-weight: 600; vertical-align: bottom; background: var(--wash); }
+th { font-weight: 600; vertical-align: bottom; background: var(--wash); white-space: normal; }
 th:first-child, td:first-child { text-align: left; }
 td small { color: var(--faint); margin-left: 5px; }
 td.tall small { display: block; margin: -3px 0 0; }
+td.text { text-align: left; white-space: normal; max-width: 90ch; }
 tr.total td { font-weight: 600; border-top: 2px solid var(--ink); }
 tr.paper td { color: var(--faint); }
 div.pair { display: flex; flex-wrap: wrap; gap: 28px; align-items: flex-start; }
 @page { size: A4; margin: 14mm; }
 @media print {
-  body { max-width: none; padding: 0; font-size: 10.5pt; }
-  h2, h3 { break-after: avoid; }
-  tr, figure { break-inside: avoid; }
+  body { max-width: none; padding: 0; font-size: 10pt; }
+  h2 { margin-top: 20px; }
+  h2, h3, p.note { break-after: avoid; }
+  table, tr, figure { break-inside: avoid; }
+  div.scroll { overflow: visible; }
   table { font-size: 7.5pt; }
+  caption { font-size: 8pt; }
   th, td { padding: 2px 4px; }
 }
 """

@@ -318,8 +318,10 @@ def _figures(figures: Mapping[str, Image.Image]) -> list[Element]:
 
 
 def _facts(title: str, facts: Mapping[str, Any]) -> list[Element]:
-    rows = [(name.replace("_", " "), plain(value)) for name, value in facts.items()]
-    return [element("h2", title), table("", ("setting", "value"), rows)]
+    rows = [
+        (name.replace("_", " "), element("td", plain(value), class_="text")) for name, value in facts.items()
+    ]
+    return [element("h2", title), table("", ("setting", ""), rows)]
 
 
 def _note(text: str) -> Element:
