@@ -33,7 +33,7 @@ _REACH = 64
 
 @dataclass(frozen=True)
 class BlindConfig:
-    """The wrap; the values were the best of some hundred on objects of the validation split only.
+    """The wrap; the values were chosen among about sixty on 20 objects of the validation split.
 
     The hand comes down along its approach axis until the hollow of the hand is `depth` below the top of what
     the camera sees, or until the open hand would touch that or the table.
