@@ -121,6 +121,17 @@ def test_every_object_weighs_the_same(hand):
     assert light.displacement == pytest.approx(heavy.displacement)
 
 
+def test_the_nominal_push_throws_out_weak_grasps(trial, mixed):
+    """Some grasps touch the can and lose it to a push of 1 N, in some direction and for a stated reason."""
+    results = trial.run_strict(mixed, np.eye(4))
+    thrown = results.push >= 0
+    assert thrown.any()
+    assert not results.held[thrown].any()
+    far = (results.push_displacement >= 0.05) | (results.push_angle >= np.radians(15))
+    np.testing.assert_array_equal(far, thrown)
+    assert np.isin(results.verdict[thrown], [Verdict.MOVED, Verdict.TURNED]).all()
+
+
 def test_order_and_company_do_not_change_results(hand, trial, mixed):
     together, backwards = trial.run_strict(mixed, np.eye(4)), trial.run_strict(mixed[::-1], np.eye(4))
     assert 0 < together.held.sum() < len(mixed)
