@@ -58,8 +58,9 @@ def test_grasp_from_a_depth_image(ffhnet, tmp_path, depth_png, untrained_weights
     for grasp in content["grasps"]:
         assert set(grasp) == {
             "palm_position", "palm_quaternion_wxyz", "joint_angles", "success_probability",
+            "robust_probability",
         }  # fmt: skip
-    scores = [grasp["success_probability"] for grasp in content["grasps"]]
+    scores = [grasp["robust_probability"] for grasp in content["grasps"]]
     assert scores == sorted(scores, reverse=True)
     # The box stands about 0.7 m before the camera; untrained networks propose palms near its middle.
     assert np.median([grasp["palm_position"][2] for grasp in content["grasps"]]) == pytest.approx(

@@ -102,3 +102,13 @@ def test_flow_learns_two_grasps_per_object_and_not_their_mean():
     right_distance = (x.abs() + views.table_height[:, None]).abs() < 0.02
     assert right_distance.float().mean() > 0.7
     assert 0.35 < (x > 0).float().mean() < 0.65
+
+
+def test_a_low_temperature_keeps_samples_together():
+    spreads = []
+    for temperature in (1.0, 0.5):
+        torch.manual_seed(0)
+        module = FlowGenerator(replace(SMALL, temperature=temperature)).eval()
+        with torch.inference_mode():
+            spreads.append(module.sample(objects(2), 300, source()).position.std(dim=1))
+    torch.testing.assert_close(spreads[1], 0.5 * spreads[0])

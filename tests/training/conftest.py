@@ -18,7 +18,16 @@ JOINT_LIMITS = ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
 SUCCESS_RADIUS = 0.03
 BASIS = np.random.default_rng(99).normal(size=(64, 3)) * 0.1
 MODEL = ModelConfig(
-    num_joints=3, bps_size=64, pca_components=12, inner_width=48, width=64, dropout=0.1, palm_points=0
+    num_joints=3,
+    bps_size=64,
+    pca_components=12,
+    inner_width=48,
+    width=64,
+    dropout=0.1,
+    generator="cvae",
+    palm_points=0,
+    flow_width=64,
+    flow_blocks=2,
 )
 
 

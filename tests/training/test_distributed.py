@@ -1,4 +1,4 @@
-"""Two processes train one network, and go on to the same weights when one of them is killed."""
+"""One or two processes train a network, and go on to the same weights when one of them is killed."""
 
 import json
 import multiprocessing
@@ -27,12 +27,12 @@ CONTEXT = multiprocessing.get_context("forkserver")
 CONTEXT.set_forkserver_preload(["torch._dynamo", "ffhnet.training"])
 
 
-def start(out: Path) -> list[BaseProcess]:
-    """Two processes that train into `out`."""
+def start(out: Path, count: int) -> list[BaseProcess]:
+    """Processes that together train a network into `out`."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    processes = [CONTEXT.Process(target=worker.main, args=(rank, port, out)) for rank in range(2)]
+    processes = [CONTEXT.Process(target=worker.main, args=(rank, count, port, out)) for rank in range(count)]
     for process in processes:
         process.start()
     return processes
@@ -47,7 +47,14 @@ def statuses(processes: list[BaseProcess]) -> list[int | None]:
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("undisturbed")
-    assert statuses(start(out)) == [0, 0]
+    assert statuses(start(out, 2)) == [0, 0]
+    return out
+
+
+@pytest.fixture(scope="module")
+def undisturbed_alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("alone")
+    assert statuses(start(out, 1)) == [0]
     return out
 
 
@@ -67,19 +74,23 @@ def test_two_processes_learn(undisturbed: Path):
     assert rows[11]["auroc"] > 0.7
 
 
-def test_a_killed_process_ends_the_run_which_resumes_to_the_same_weights(undisturbed: Path, tmp_path: Path):
+@pytest.mark.parametrize(("count", "whole_run"), [(1, "undisturbed_alone"), (2, "undisturbed")])
+def test_a_killed_process_ends_the_run_which_resumes_to_the_same_weights(
+    count: int, whole_run: str, tmp_path: Path, request: pytest.FixtureRequest
+):
+    undisturbed = request.getfixturevalue(whole_run)
     chance = random.Random(time.time_ns())
-    processes = start(tmp_path)
+    processes = start(tmp_path, count)
     state = tmp_path / "rank0" / "evaluator_state.safetensors"
     while not state.exists():
         assert all(process.is_alive() for process in processes)
         time.sleep(0.001)
     time.sleep(chance.uniform(0, 0.3))
-    processes[chance.randrange(2)].kill()
+    processes[chance.randrange(count)].kill()
     assert all(status != 0 for status in statuses(processes))
     assert not (tmp_path / "rank0.safetensors").exists()
 
-    assert statuses(start(tmp_path)) == [0, 0]
+    assert statuses(start(tmp_path, count)) == [0] * count
     whole, resumed = (load_file(out / "rank0.safetensors") for out in (undisturbed, tmp_path))
     assert all(torch.equal(whole[name], resumed[name]) for name in whole)
     for name in ("evaluator_log.jsonl", "config.json"):

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from ffhnet.model.losses import JOINTS_WEIGHT, KL_WEIGHT
 from ffhnet.training import TrainingConfig, train_evaluator, train_generator
 from ffhnet.training import loop as loop_module
 from ffhnet.training.batches import BatchMaker
-from ffhnet.training.tasks import EvaluatorTask, GeneratorTask
+from ffhnet.training.tasks import EvaluatorTask, FlowTask, GeneratorTask
 
 MakeWorld = Callable[..., TrainingData]
 Limits = tuple[tuple[float, ...], tuple[float, ...]]
@@ -68,14 +69,43 @@ def test_generator_learns_the_small_world(
     assert (sampled - own).norm(dim=-1).median() < 0.7 * (sampled - own.roll(1, 0)).norm(dim=-1).median()
 
 
-@pytest.mark.parametrize("train", [train_generator, train_evaluator])
+def test_flow_learns_the_small_world(
+    tmp_path: Path, make_world: MakeWorld, model: ModelConfig, joint_limits: Limits
+):
+    config = TrainingConfig(model=replace(model, generator="flow"), steps=300, views=32, grasps=32)
+    data, val = make_world(0, objects=150), make_world(1)
+    generator = train_generator(data, val, config, tmp_path, joint_limits, progress=False)
+    assert last_metrics(tmp_path, "generator")["velocity_error"] < 1.2  # 2 for a velocity of zero
+    batch = BatchMaker.for_generator(val).draw(np.random.default_rng(0), views=64, grasps=32)
+    with torch.inference_mode():
+        sampled = generator.sample(batch.objects, 50, torch.Generator().manual_seed(0)).position
+    own = batch.grasps.position.mean(1, keepdim=True)
+    assert (sampled - own).norm(dim=-1).median() < 0.7 * (sampled - own.roll(1, 0)).norm(dim=-1).median()
+
+
+@pytest.mark.parametrize(
+    ("train", "task_kind", "kind"),
+    [
+        (train_generator, GeneratorTask, "cvae"),
+        (train_generator, FlowTask, "flow"),
+        (train_evaluator, EvaluatorTask, "flow"),
+    ],
+)
 def test_killed_run_resumes_to_the_same_weights(
-    tmp_path: Path, make_world: MakeWorld, short: TrainingConfig, joint_limits: Limits, train, monkeypatch
+    tmp_path: Path,
+    make_world: MakeWorld,
+    short: TrainingConfig,
+    joint_limits: Limits,
+    train,
+    task_kind,
+    kind,
+    monkeypatch,
 ):
     data = make_world(0)
+    short = replace(short, model=replace(short.model, generator=kind, palm_points=4))
+    train = partial(train, palm_points=np.linspace(-0.05, 0.05, 12).reshape(4, 3))
     whole = train(data, data, short, tmp_path / "whole", joint_limits, progress=False)
 
-    task_kind = GeneratorTask if train is train_generator else EvaluatorTask
     plain_loss = task_kind.loss
 
     def dies(self, step: int, rng: np.random.Generator):

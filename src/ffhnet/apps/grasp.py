@@ -177,6 +177,7 @@ def _show(grasps: Grasps, hand: Hand) -> None:
         [
             str(i + 1),
             f"{grasps.probability[i]:.3f}",
+            "-" if grasps.robustness is None else f"{grasps.robustness[i]:.3f}",
             " ".join(f"{value:+.3f}" for value in grasps.position[i]),
             " ".join(f"{value:+.2f}" for value in grasps.rotation[i, :, 0]),
             f"{flexion[i]:.0f}",
@@ -185,6 +186,6 @@ def _show(grasps: Grasps, hand: Hand) -> None:
     ]
     print_table(
         f"{len(grasps)} grasps of {grasps.hand}, the best {len(rows)}, in the {grasps.frame} frame",
-        ["rank", "probability", "palm position (m)", "approach direction", "mean flexion (°)"],
+        ["rank", "probability", "robust", "palm position (m)", "approach direction", "mean flexion (°)"],
         rows,
     )

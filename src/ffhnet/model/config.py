@@ -24,6 +24,8 @@ class ModelConfig:
         joint_scale: radians that count as 1.
         height_scale: metres of table height that count as 1.
         generator: FFHGenerator ("cvae", the paper's) or FlowGenerator ("flow").
+        temperature: standard deviation of the noise that samples start from; below 1, samples keep to what the
+            generator is sure of: fewer collisions, less variety.
         latent: size of the cVAE's latent vector.
         inner_width: width between the two layers of a ResBlock.
         width: output width of a ResBlock.
@@ -46,6 +48,7 @@ class ModelConfig:
     joint_scale: float = 0.5
     height_scale: float = 0.1
     generator: Literal["cvae", "flow"] = "flow"
+    temperature: float = 0.7
     latent: int = 5
     inner_width: int = 256
     width: int = 512
@@ -63,6 +66,8 @@ class ModelConfig:
             raise OptionError(f"all sizes of ModelConfig must be at least 1, got {sizes}")
         if self.palm_points < 0:
             raise OptionError(f"palm_points must be at least 0, got {self.palm_points}")
+        if not 0 < self.temperature <= 2:
+            raise OptionError(f"the temperature must lie above 0 and up to 2, got {self.temperature}")
         if self.generator not in ("cvae", "flow"):
             raise OptionError(f"the generator is 'cvae' or 'flow', got {self.generator!r}")
         if self.pca_components is not None and not 1 <= self.pca_components <= self.bps_size:
@@ -91,6 +96,7 @@ class ModelConfig:
             position_scale=1.0,
             joint_scale=1.0,
             generator="cvae",
+            temperature=1.0,
             palm_points=0,
             judge_robustness=False,
         )

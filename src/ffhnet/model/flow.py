@@ -104,7 +104,8 @@ class FlowGenerator(nn.Module):
             source: of the noise, on the CPU.
         """
         views, device = len(objects.bps), objects.bps.device
-        x = torch.randn(views, num, self.state_width, generator=source).to(device)
+        noise = torch.randn(views, num, self.state_width, generator=source)
+        x = self.config.temperature * noise.to(device)
         view = self._look(objects)
         steps = self.config.flow_steps
         for step in range(steps):

@@ -72,9 +72,9 @@ class FFHGenerator(nn.Module):
         )
 
     def sample(self, objects: ObjectTensors, num: int, source: torch.Generator) -> GraspTensors:
-        """`num` grasps for each view from latent samples z ~ N(0, I), which `source` draws on the CPU."""
-        latent = torch.randn(len(objects.bps), num, self.config.latent, generator=source)
-        return self.decode(objects, latent.to(objects.bps.device))
+        """`num` grasps for each view from latent samples z ~ N(0, temperature² I), drawn on the CPU."""
+        noise = torch.randn(len(objects.bps), num, self.config.latent, generator=source)
+        return self.decode(objects, self.config.temperature * noise.to(objects.bps.device))
 
     def forward(
         self, objects: ObjectTensors, grasps: GraspTensors, noise: Float[Tensor, "V G L"]

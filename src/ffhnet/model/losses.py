@@ -14,6 +14,8 @@ ROTATION_WEIGHT = 1.0
 POSITION_WEIGHT = 100.0
 JOINTS_WEIGHT = 10.0
 KL_WEIGHT = 5e-3
+AUXILIARY_WEIGHT = 0.3
+"""Of the evaluator's outputs beside success."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ def evaluator_loss(
     robust: Float[Tensor, "V G"],
     collision: Float[Tensor, "V G"],
 ) -> Float[Tensor, ""]:
-    """Binary cross-entropy (Eq. 5) of success, and of robustness and collision where the model predicts them.
+    """Binary cross-entropy (Eq. 5) of success, and of the outputs beside it where the model has them.
 
     Args:
         logits: of each grasp.
@@ -65,8 +67,12 @@ def evaluator_loss(
     """
     total = functional.binary_cross_entropy_with_logits(logits.success, success)
     if logits.robust is not None and logits.collision is not None:
-        total = total + functional.binary_cross_entropy_with_logits(logits.collision, collision)
+        total = total + AUXILIARY_WEIGHT * functional.binary_cross_entropy_with_logits(
+            logits.collision, collision
+        )
         known = ~robust.isnan()
         if known.any():
-            total = total + functional.binary_cross_entropy_with_logits(logits.robust[known], robust[known])
+            total = total + AUXILIARY_WEIGHT * functional.binary_cross_entropy_with_logits(
+                logits.robust[known], robust[known]
+            )
     return total

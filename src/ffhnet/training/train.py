@@ -66,10 +66,10 @@ def train_generator(
     task: Task
     module: Generator
     if config.model.generator == "flow":
-        module = _initial(FlowGenerator, data, config, start, palm_points).to(processes.device)
+        module = initial_network(FlowGenerator, data, config, start, palm_points).to(processes.device)
         task = FlowTask(module, part, data, val)
     else:
-        module = _initial(FFHGenerator, data, config, start, palm_points).to(processes.device)
+        module = initial_network(FFHGenerator, data, config, start, palm_points).to(processes.device)
         task = GeneratorTask(module, part, data, val)
     metrics = fit(task, config, out_dir, "generator", progress, processes)
     if processes.first:
@@ -91,7 +91,7 @@ def train_evaluator(
 ) -> FFHEvaluator:
     """Train an FFHEvaluator on all trials in `data` and write it to `out_dir`; else as `train_generator`."""
     _check_data(data, config.model)
-    module = _initial(FFHEvaluator, data, config, start, palm_points).to(processes.device)
+    module = initial_network(FFHEvaluator, data, config, start, palm_points).to(processes.device)
     part = dataclasses.replace(config, views=processes.share(config.views))
     metrics = fit(EvaluatorTask(module, part, data, val), config, out_dir, "evaluator", progress, processes)
     if processes.first:
@@ -100,7 +100,7 @@ def train_evaluator(
     return module
 
 
-def _initial(
+def initial_network(
     kind: type[Network],
     data: TrainingData,
     config: TrainingConfig,
