@@ -61,17 +61,17 @@ def test_views_do_not_see_each_other():
     module.geometry.set_points(np.random.default_rng(0).normal(size=(5, 3)) * 0.05)
     both, noise = objects(2), torch.randn(2, 8, 11)
     with torch.inference_mode():
-        together = module._velocity(module._look(both), noise, torch.full((2, 8), 0.4))
+        together = module._velocity(module._look(both), noise, torch.full((2,), 0.4))
         for view in range(2):
             alone = ObjectTensors(both.bps[view : view + 1], both.table_height[view : view + 1])
-            single = module._velocity(module._look(alone), noise[view : view + 1], torch.full((1, 8), 0.4))
+            single = module._velocity(module._look(alone), noise[view : view + 1], torch.full((1,), 0.4))
             torch.testing.assert_close(single[0], together[view], atol=1e-5, rtol=1e-4)
 
 
 def test_untrained_flow_carries_noise_nowhere_and_the_loss_is_that_of_a_zero_velocity():
     module, wanted = FlowGenerator(SMALL), grasps(2, 500)
     module.set_statistics(wanted)
-    noise, time = torch.randn(2, 500, 11, generator=source(3)), torch.rand(2, 500, generator=source(4))
+    noise, time = torch.randn(2, 500, 11, generator=source(3)), torch.rand(2, generator=source(4))
     torch.nn.init.zeros_(module.head.bias)
     loss = module.loss(objects(2), wanted, noise, time)
     state = (module._raw(wanted) - module.mean) / module.deviation
@@ -92,8 +92,8 @@ def test_flow_learns_two_grasps_per_object_and_not_their_mean():
         return GraspTensors(rotation, torch.stack([x, 0 * x, 0 * x], -1), torch.zeros(16, 32, 2))
 
     module.set_statistics(batch())
-    for _ in range(400):
-        loss = module.loss(views, batch(), torch.randn(16, 32, 11), torch.rand(16, 32))
+    for _ in range(800):
+        loss = module.loss(views, batch(), torch.randn(16, 32, 11), torch.rand(16))
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()

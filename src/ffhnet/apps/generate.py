@@ -147,7 +147,8 @@ def _checked_weights(options: GenerateOptions) -> str | None:
     if options.weights is None:
         return None
     from ffhnet.hands import DEFAULT_HAND
-    from ffhnet.inference.ffhnet import FFHNet
+    from ffhnet.inference.ffhnet import FFHNet, find_weights
 
-    FFHNet.from_pretrained(options.weights, hand=DEFAULT_HAND, device="cpu")
-    return str(options.weights)
+    folder = find_weights(options.weights)
+    FFHNet.from_pretrained(folder, hand=DEFAULT_HAND, device="cpu")
+    return str(folder)

@@ -53,6 +53,8 @@ class GraspOptions:
     """Grasps to sample."""
     threshold: float = 0.0
     """Leave out grasps below this probability."""
+    max_failure: Annotated[float | None, absent("P")] = None
+    """Abstain where the best grasp cannot be promised to fail at most this often, with 95 % confidence."""
     seed: int = 0
     """Same seed, same grasps."""
     weights: Annotated[Path | None, absent("DIR", "those that come with the package")] = None
@@ -85,17 +87,26 @@ def run(options: GraspOptions) -> None:
         hand = wanted or load_hand(network.info.hand)
     with busy("sampling and ranking grasps"):
         grasps = network.grasp(observation, options.num, options.seed, options.threshold)
+    refusal = None
+    if options.max_failure is not None:
+        refusal = network.control_risk(options.max_failure).refusal(grasps.score)
+        grasps = grasps if refusal is None else grasps[:0]
     # Files before anything is printed: a reader that closes the pipe early must not cost them.
     if options.out is not None:
         save_grasps(grasps, options.out)
     if options.plot is not None:
         if len(grasps) == 0:
-            raise OptionError(f"nothing to plot: no grasp reaches the threshold {options.threshold:g}")
+            raise OptionError(
+                f"nothing to plot: {refusal or f'no grasp reaches the threshold {options.threshold:g}'}"
+            )
         with busy("drawing"):
             from ffhnet.evaluation.picture import grasp_picture
 
             grasp_picture(observation, grasps, hand, options.plot, title=options.input.name)
-    _show(grasps, hand)
+    if refusal is None:
+        _show(grasps, hand)
+    else:
+        print(refusal)
     if options.out is not None:
         print(f"{len(grasps)} grasps written to {options.out}")
     if options.plot is not None:

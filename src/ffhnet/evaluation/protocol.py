@@ -136,14 +136,6 @@ def _load_network(weights: str | None) -> FFHNet:
     return FFHNet.from_pretrained(weights, device="cpu")
 
 
-def _rank_score(grasps: Grasps) -> Float[np.ndarray, " N"]:
-    """What the network ranks by: how robust a grasp is if it says so, else how probable its success."""
-    robustness = getattr(grasps, "robustness", None)
-    score = grasps.probability if robustness is None else robustness
-    assert score is not None
-    return score
-
-
 @dataclass(frozen=True)
 class _Streams:
     """Randomness of one view, a stream for each purpose, so that doing more of one thing changes no other."""
@@ -184,7 +176,7 @@ class _ViewTrials:
         results = self._execute(grasps[chosen])
         samples = Samples(
             rank=chosen,
-            score=_rank_score(grasps)[chosen],
+            score=grasps.score[chosen],
             drawn=drawn,
             grasps=grasps[chosen],
             tries=Tries.of(results),

@@ -13,6 +13,8 @@ from jaxtyping import Float
 from ffhnet.errors import HandError, OptionError, WeightsError
 from ffhnet.geometry.transforms import invert
 from ffhnet.grasps import Grasps
+from ffhnet.inference.risk import RiskControl
+from ffhnet.inference.weights_calibration import WeightsCalibration, load_calibration
 from ffhnet.model.checkpoint import Checkpoint, CheckpointInfo, load_checkpoint
 from ffhnet.model.tensors import GraspTensors, ObjectTensors
 
@@ -25,7 +27,13 @@ VIEW_FRAME = "view"
 class FFHNet:
     """FFHGenerator and FFHEvaluator of one hand (figure 1)."""
 
-    def __init__(self, checkpoint: Checkpoint, device: torch.device | str = "cpu"):
+    def __init__(
+        self,
+        checkpoint: Checkpoint,
+        device: torch.device | str = "cpu",
+        calibration: WeightsCalibration | None = None,
+    ):
+        self.calibration = calibration
         self.info: CheckpointInfo = checkpoint.info
         self.device = torch.device(device)
         self.generator = checkpoint.generator.to(self.device)
@@ -53,7 +61,8 @@ class FFHNet:
         """
         if device is None:
             device = "cuda" if torch.cuda.is_available() else "cpu"
-        return cls(load_checkpoint(_find_weights(path_or_name), hand=hand), device)
+        folder = find_weights(path_or_name)
+        return cls(load_checkpoint(folder, hand=hand), device, load_calibration(folder))
 
     def grasp(
         self, observation: Observation, num: int = 400, seed: int = 0, threshold: float = 0.0
@@ -117,6 +126,20 @@ class FFHNet:
         rated = self._rate(observation, grasps.to_frame(invert(observation.T_input_view), VIEW_FRAME))
         return grasps.replace(probability=rated.probability, robustness=rated.robustness)
 
+    def control_risk(self, max_failure: float, confidence: float = 0.95) -> RiskControl:
+        """The threshold on the best grasp's score that keeps executed failures below a bound (`risk.py`).
+
+        Args:
+            max_failure: bound of P(failure | executed) with unknown mass, friction and a palm slightly off.
+            confidence: probability that the bound holds.
+
+        Raises:
+            WeightsError: these weights were not calibrated.
+        """
+        if self.calibration is None:
+            raise WeightsError("a risk can only be chosen with calibrated weights: run `ffhnet calibrate`")
+        return self.calibration.risk.control(max_failure, confidence)
+
     def _rate(self, observation: Observation, in_view: Grasps) -> Grasps:
         def tensor(array: np.ndarray) -> torch.Tensor:
             return torch.as_tensor(array, dtype=torch.float32, device=self.device).unsqueeze(0)
@@ -124,10 +147,11 @@ class FFHNet:
         grasps = GraspTensors(tensor(in_view.rotation), tensor(in_view.position), tensor(in_view.joints))
         with torch.inference_mode():
             logits = self.evaluator(self._objects(observation), grasps)
-        return in_view.replace(
+        rated = in_view.replace(
             probability=_probability(logits.success),
             robustness=None if logits.robust is None else _probability(logits.robust),
         )
+        return rated if self.calibration is None else self.calibration.apply(rated)
 
     def _objects(self, observation: Observation) -> ObjectTensors:
         wanted = self.info.model.bps_size
@@ -147,7 +171,12 @@ def shipped_weights() -> Path:
     return Path(str(resources.files("ffhnet"))) / "weights"
 
 
-def _find_weights(path_or_name: str | Path | None) -> Path:
+def find_weights(path_or_name: str | Path | None) -> Path:
+    """The folder of weights that a user names: a path, shipped weights by name, or the default for None.
+
+    Raises:
+        WeightsError: there is none.
+    """
     if path_or_name is None:
         return shipped_weights()
     for folder in (Path(path_or_name), shipped_weights() / path_or_name):

@@ -132,6 +132,11 @@ def read_info(folder: Path) -> CheckpointInfo:
     return _read_config(folder)[0]
 
 
+def weights_digest(folder: Path) -> dict[str, str]:
+    """Checksum of each network's file in a folder of weights, by file name. Raises WeightsError."""
+    return _read_config(folder)[1]
+
+
 def _storable(network: nn.Module, half: bool) -> dict[str, torch.Tensor]:
     """Weights on the CPU; vectors stay 32-bit, since a running variance can be too small for 16 bits."""
     return {

@@ -24,8 +24,8 @@ class ModelConfig:
         joint_scale: radians that count as 1.
         height_scale: metres of table height that count as 1.
         generator: FFHGenerator ("cvae", the paper's) or FlowGenerator ("flow").
-        temperature: standard deviation of the noise that samples start from; below 1, samples keep to what the
-            generator is sure of: fewer collisions, less variety.
+        temperature: standard deviation of the noise that samples start from; below 1, samples keep to what
+            the generator is sure of: fewer collisions, less variety.
         latent: size of the cVAE's latent vector.
         inner_width: width between the two layers of a ResBlock.
         width: output width of a ResBlock.

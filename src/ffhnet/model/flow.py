@@ -39,7 +39,7 @@ class FlowBlock(nn.Module):
         nn.init.zeros_(self.second.weight)
         nn.init.zeros_(self.second.bias)
 
-    def forward(self, x: Float[Tensor, "V G F"], context: Float[Tensor, "V G C"]) -> Float[Tensor, "V G F"]:
+    def forward(self, x: Float[Tensor, "V G F"], context: Float[Tensor, "V 1 C"]) -> Float[Tensor, "V G F"]:
         """The input plus what the block makes of it."""
         scale, shift = self.modulation(context).chunk(2, dim=-1)
         return x + self.second(functional.silu(self.first(self.norm(x) * (1 + scale) + shift)))
@@ -87,11 +87,11 @@ class FlowGenerator(nn.Module):
         objects: ObjectTensors,
         grasps: GraspTensors,
         noise: Float[Tensor, "V G S"],
-        time: Float[Tensor, "V G"],
+        time: Float[Tensor, " V"],
     ) -> Float[Tensor, ""]:
-        """Mean square error of the velocity at a time along the straight path from noise to grasp."""
+        """Mean square error of the velocity at each view's time along straight paths."""
         grasp = (self._raw(grasps) - self.mean) / self.deviation
-        t = time.unsqueeze(-1)
+        t = time[:, None, None]
         view = self._look(objects)
         return functional.mse_loss(self._velocity(view, (1 - t) * noise + t * grasp, time), grasp - noise)
 
@@ -109,7 +109,7 @@ class FlowGenerator(nn.Module):
         view = self._look(objects)
         steps = self.config.flow_steps
         for step in range(steps):
-            time = torch.full((views, num), step / steps, device=device)
+            time = torch.full((views,), step / steps, device=device)
             x = x + self._velocity(view, x, time) / steps
         return self._grasps(x)
 
@@ -135,12 +135,12 @@ class FlowGenerator(nn.Module):
         self,
         view: tuple[ObjectTensors, Tensor, Tensor | None],
         x: Float[Tensor, "V G S"],
-        time: Float[Tensor, "V G"],
+        time: Float[Tensor, " V"],
     ) -> Float[Tensor, "V G S"]:
         objects, embedded, grid = view
         angle = time.unsqueeze(-1) * self.frequency
         clock = self.time_layer(torch.cat([angle.sin(), angle.cos()], dim=-1))
-        context = functional.silu(embedded.unsqueeze(1) + clock)
+        context = functional.silu(embedded + clock).unsqueeze(1)
         seen = x
         if self.geometry is not None and grid is not None:
             seen = torch.cat([x, self.geometry(grid, objects, self._grasps(x))], dim=-1)

@@ -1,0 +1,142 @@
+"""`ffhnet calibrate`: make the probabilities of trained weights tell the truth."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from ffhnet.apps.console import print_table, progress_bar
+from ffhnet.apps.extras import require_sim
+from ffhnet.errors import OptionError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ffhnet.evaluation.own_samples import OwnSamples, OwnSamplesJob
+
+
+@dataclass(frozen=True)
+class CalibrateOptions:
+    """Try the generator's own grasps on unseen objects, and write what was learned beside the weights.
+
+    The first objects fit the maps of the probabilities; the others, which the maps have not seen, are the
+    record from which `ffhnet grasp --max-failure` picks its threshold.
+    """
+
+    weights: Annotated[Path, tyro.conf.Positional]
+    """Folder of weights; gets calibration.json."""
+    objects: str = "procedural-val:384"
+    """Objects that trained nothing."""
+    first: int = 24
+    """Leave out this many of them, which development looked at."""
+    fit: int = 60
+    """How many of the others fit the maps."""
+    views: int = 4
+    """Views per object, its resting poses in turn."""
+    samples: int = 400
+    """Grasps sampled and rated per view."""
+    executed: int = 16
+    """Random ones of them executed per view."""
+    seed: int = 0
+    """Seed of all randomness."""
+    workers: int = field(default_factory=lambda: os.cpu_count() or 1)
+    """Processes; the result does not depend on their number."""
+
+
+def run(options: CalibrateOptions) -> None:
+    """Try, fit, write, and print how far the probabilities were off."""
+    require_sim("calibrate")
+    import numpy as np
+
+    from ffhnet.evaluation.own_samples import OwnSamplesJob
+    from ffhnet.inference.calibration import fit_calibration
+    from ffhnet.inference.risk import RiskTable
+    from ffhnet.inference.weights_calibration import WeightsCalibration, save_calibration
+    from ffhnet.model.checkpoint import load_checkpoint
+    from ffhnet.objects.catalogue import resolve_objects
+
+    if min(options.views, options.samples, options.executed, options.workers) < 1 or options.first < 0:
+        raise OptionError("--views, --samples, --executed, --workers must be at least 1, --first at least 0")
+    sources = resolve_objects(options.objects)[options.first :]
+    if not 2 <= options.fit <= len(sources) - 2:
+        raise OptionError(
+            f"--fit must leave 2 of the {len(sources)} objects on either side, got {options.fit}"
+        )
+    robust = load_checkpoint(options.weights).info.model.judge_robustness
+    jobs = [
+        OwnSamplesJob(
+            source, str(options.weights), options.views, options.samples, options.executed, options.seed
+        )
+        for source in sources
+    ]
+    found = _try_all(jobs, options.workers)
+    fitting = [view for views in found[: options.fit] for view in views]
+    record = [view for views in found[options.fit :] for view in views]
+    ids = np.repeat([view.object_name for view in fitting], [len(view.success) for view in fitting])
+    success, held = _joined(fitting, "success"), _joined(fitting, "held")
+    nominal = fit_calibration(ids, _joined(fitting, "probability"), success)
+    varied = fit_calibration(ids, _joined(fitting, "robustness"), held) if robust else None
+    ranked_by = nominal if varied is None else varied
+    table = RiskTable(
+        np.array([view.object_name for view in record]),
+        ranked_by.calibration.apply(np.array([view.top_score for view in record])),
+        np.array([view.top_held for view in record]),
+    )
+    source = (
+        f"{options.objects} without the first {options.first}: {options.fit} objects for the maps, "
+        f"{len(found) - options.fit} for the risk; {options.views} views, seed {options.seed}"
+    )
+    calibration = WeightsCalibration(
+        nominal.calibration, None if varied is None else varied.calibration, table, source
+    )
+    save_calibration(options.weights, calibration)
+    rows = []
+    for name, fitted, label in (("success", nominal, success), ("robust", varied, held)):
+        if fitted is not None:
+            before, after = fitted.ece["identity"], fitted.ece[fitted.kind]
+            rows.append(
+                (name, str(len(label)), f"{label.mean():.1%}", fitted.kind, f"{before:.3f}", f"{after:.3f}")
+            )
+    print_table(
+        f"own samples of {options.fit} objects; ECE on objects held out",
+        ("probability of", "tried", "held", "map", "ECE before", "after"),
+        rows,
+    )
+    for risk in (0.2, 0.1, 0.05, 0.02):
+        control = table.control(risk)
+        if control.threshold is None:
+            print(f"at most {risk:.0%} failures: cannot be promised from {control.objects} objects")
+        else:
+            print(
+                f"at most {risk:.0%} failures: from {control.threshold:g}; of {len(table.score)} views of "
+                f"{control.objects} objects {control.executed:.0%} executed, {control.failures:.1%} failed"
+            )
+
+
+def _try_all(jobs: list[OwnSamplesJob], workers: int) -> list[list[OwnSamples]]:
+    """The views of all objects, in the order of the jobs whatever the order in which processes end."""
+    from ffhnet.dataset.executors import LocalExecutor
+    from ffhnet.evaluation.own_samples import try_own_samples
+
+    done: dict[str, list[OwnSamples]] = {}
+    with progress_bar("objects", len(jobs)) as step:
+
+        def keep(job: OwnSamplesJob, views: list[OwnSamples]) -> None:
+            done[job.source.name] = views
+            step()
+
+        def fail(job: OwnSamplesJob, error: Exception) -> None:
+            raise error
+
+        LocalExecutor(workers).run(try_own_samples, jobs, keep, fail)
+    return [done[job.source.name] for job in jobs]
+
+
+def _joined(views: list[OwnSamples], name: str) -> np.ndarray:
+    import numpy as np
+
+    return np.concatenate([getattr(view, name) for view in views])
