@@ -32,6 +32,8 @@ class TrainOptions:
     """Data set of held-out objects to measure on."""
     preset: Literal["default", "paper"] = "default"
     """The project's own architecture and recipe, or the paper's (section III-D; hours on a CPU)."""
+    generator: Annotated[Literal["flow", "cvae"] | None, absent("flow|cvae", "the preset's")] = None
+    """Flow matching, or the paper's conditional variational autoencoder."""
     networks: Literal["both", "generator", "evaluator"] = "both"
     """Which of them to train."""
     start: Annotated[Path | None, absent("DIR")] = None
@@ -79,7 +81,8 @@ def _train(options: TrainOptions, processes: Processes) -> None:
     val = None if options.val is None else read_training_data([options.val])
     start = None if options.start is None else load_checkpoint(options.start, hand=data.hand)
     config = TrainingConfig.paper() if options.preset == "paper" else TrainingConfig.default()
-    config = dataclasses.replace(config, steps=options.steps or config.steps, seed=options.seed)
+    model = dataclasses.replace(config.model, generator=options.generator or config.model.generator)
+    config = dataclasses.replace(config, model=model, steps=options.steps or config.steps, seed=options.seed)
     hand = load_hand(data.hand)
     limits = (hand.lower.tolist(), hand.upper.tolist())
     points = surface_points(hand, config.model.palm_points) if config.model.palm_points else None
