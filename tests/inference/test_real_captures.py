@@ -34,7 +34,7 @@ def network():
 def check(network, observation):
     grasps = network.grasp(observation, num=400)
     assert len(grasps) == 400
-    assert (np.diff(grasps.probability) <= 0).all()
+    assert (np.diff(grasps.score) <= 0).all()
     best = grasps[:20]
     distance = cKDTree(observation.cloud).query(best.position)[0]
     # The palm origin lies 6 cm inside the hand: nearer than 3 cm, the palm would be in the object.
