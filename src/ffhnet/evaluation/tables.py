@@ -205,7 +205,7 @@ class Table:
             "evaluator": self.calibration.to_json(),
             "unseen_views": [{"object": u.object_name, "pose": u.pose_name} for u in self.unseen],
         }
-        return json.dumps(_without_nan(content), indent=2) + "\n"
+        return json.dumps(_without_nan(content)) + "\n"
 
 
 def make_table(outcomes: Sequence[ViewOutcome], unseen: Sequence[UnseenView] = ()) -> Table:
