@@ -116,8 +116,15 @@ def test_local_workers_are_renewed(monkeypatch):
 def test_run_jobs_stops_at_the_first_failure():
     done = []
     with pytest.raises(ObjectError, match="number two"):
-        run_jobs(work.bad_or_square, [0, 2, *range(4, 500)], 1, done.append)
-    assert done == [0]
+        run_jobs(work.bad_or_square, [0, 2, *range(4, 500)], 1, lambda: done.append(1))
+    assert len(done) == 1
+
+
+def test_run_jobs_gives_results_in_the_order_of_the_jobs():
+    steps = []
+    results = run_jobs(work.square, [5, *range(40), 5], 2, lambda: steps.append(1))
+    assert results == [25, *(n * n for n in range(40)), 25]
+    assert len(steps) == 42
 
 
 @needs_proc

@@ -40,7 +40,7 @@ def start(out: Path, count: int) -> list[BaseProcess]:
 
 def statuses(processes: list[BaseProcess]) -> list[int | None]:
     for process in processes:
-        process.join(timeout=60)
+        process.join(timeout=300)
     return [process.exitcode for process in processes]
 
 

@@ -62,14 +62,8 @@ def run(options: BenchmarkOptions) -> None:
         raise OptionError(f"--first {options.first} leaves out all of {options.objects}")
     weights = None if options.learned == 0 else str(options.weights or shipped_weights())
     config = GenerateConfig(seed=options.seed, weights=weights, learned=options.learned, repeated_share=0)
-    measured: list[ObjectMeasurement] = []
     with progress_bar("objects", len(sources)) as step:
-
-        def done(measurement: ObjectMeasurement) -> None:
-            measured.append(measurement)
-            step()
-
-        run_jobs(measure_object, [(source, config) for source in sources], options.workers, done)
+        measured = run_jobs(measure_object, [(source, config) for source in sources], options.workers, step)
     figures = _figures(measured)
     _print(measured, figures)
     if options.json is not None:

@@ -16,7 +16,7 @@ from ffhnet.errors import OptionError
 if TYPE_CHECKING:
     import numpy as np
 
-    from ffhnet.evaluation.own_samples import OwnSamples, OwnSamplesJob
+    from ffhnet.evaluation.own_samples import OwnSamples
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,8 @@ def run(options: CalibrateOptions) -> None:
     require_sim("calibrate")
     import numpy as np
 
-    from ffhnet.evaluation.own_samples import OwnSamplesJob
+    from ffhnet.dataset.executors import run_jobs
+    from ffhnet.evaluation.own_samples import OwnSamplesJob, try_own_samples
     from ffhnet.inference.calibration import fit_calibration
     from ffhnet.inference.risk import RiskTable
     from ffhnet.inference.weights_calibration import WeightsCalibration, save_calibration
@@ -73,7 +74,8 @@ def run(options: CalibrateOptions) -> None:
         )
         for source in sources
     ]
-    found = _try_all(jobs, options.workers)
+    with progress_bar("objects", len(jobs)) as step:
+        found = run_jobs(try_own_samples, jobs, options.workers, step)
     fitting = [view for views in found[: options.fit] for view in views]
     record = [view for views in found[options.fit :] for view in views]
     ids = np.repeat([view.object_name for view in fitting], [len(view.success) for view in fitting])
@@ -115,25 +117,6 @@ def run(options: CalibrateOptions) -> None:
                 f"at most {risk:.0%} failures: from {control.threshold:g}; of {len(table.score)} views of "
                 f"{control.objects} objects {control.executed:.0%} executed, {control.failures:.1%} failed"
             )
-
-
-def _try_all(jobs: list[OwnSamplesJob], workers: int) -> list[list[OwnSamples]]:
-    """The views of all objects, in the order of the jobs whatever the order in which processes end."""
-    from ffhnet.dataset.executors import LocalExecutor
-    from ffhnet.evaluation.own_samples import try_own_samples
-
-    done: dict[str, list[OwnSamples]] = {}
-    with progress_bar("objects", len(jobs)) as step:
-
-        def keep(job: OwnSamplesJob, views: list[OwnSamples]) -> None:
-            done[job.source.name] = views
-            step()
-
-        def fail(job: OwnSamplesJob, error: Exception) -> None:
-            raise error
-
-        LocalExecutor(workers).run(try_own_samples, jobs, keep, fail)
-    return [done[job.source.name] for job in jobs]
 
 
 def _joined(views: list[OwnSamples], name: str) -> np.ndarray:

@@ -12,8 +12,7 @@ from ffhnet.apps.extras import require_sim
 from ffhnet.errors import OptionError
 
 if TYPE_CHECKING:
-    from ffhnet.evaluation.outcomes import UnseenView, ViewOutcome
-    from ffhnet.evaluation.protocol import Protocol, ViewJob
+    from ffhnet.evaluation.protocol import Protocol
 
 
 @dataclass(frozen=True)
@@ -61,9 +60,10 @@ def run(options: EvaluateOptions) -> None:
 
     from ffhnet.apps.evaluation_tables import print_evaluation
     from ffhnet.apps.machine import describe_machine
+    from ffhnet.dataset.executors import run_jobs
     from ffhnet.evaluation.figures import draw_figures
     from ffhnet.evaluation.outcomes import ViewOutcome
-    from ffhnet.evaluation.protocol import view_jobs
+    from ffhnet.evaluation.protocol import evaluate_view, view_jobs
     from ffhnet.evaluation.report import report
     from ffhnet.evaluation.tables import make_table
     from ffhnet.files import check_output, write_atomically
@@ -75,7 +75,9 @@ def run(options: EvaluateOptions) -> None:
             check_output(path, (suffix,))
     protocol = _protocol(options)
     sources = resolve_objects(options.objects)
-    found = _evaluate(view_jobs(sources, protocol), options.workers)
+    jobs = view_jobs(sources, protocol)
+    with progress_bar("views", len(jobs)) as step:
+        found = run_jobs(evaluate_view, jobs, options.workers, step)
     outcomes = [view for view in found if isinstance(view, ViewOutcome)]
     unseen = [view for view in found if not isinstance(view, ViewOutcome)]
     if not outcomes:
@@ -116,22 +118,3 @@ def _protocol(options: EvaluateOptions) -> Protocol:
         weights=None if options.weights is None else str(options.weights),
         physics=dataclasses.replace(physics, friction=(options.friction, *physics.friction[1:])),
     )
-
-
-def _evaluate(jobs: list[ViewJob], workers: int) -> list[ViewOutcome | UnseenView]:
-    """All views, in the order of the jobs whatever the order in which processes end."""
-    from ffhnet.dataset.executors import LocalExecutor
-    from ffhnet.evaluation.protocol import evaluate_view
-
-    done: dict[tuple[str, int], ViewOutcome | UnseenView] = {}
-    with progress_bar("views", len(jobs)) as step:
-
-        def keep(job: ViewJob, outcome: ViewOutcome | UnseenView) -> None:
-            done[job.source.name, job.placement] = outcome
-            step()
-
-        def fail(job: ViewJob, error: Exception) -> None:
-            raise error
-
-        LocalExecutor(workers).run(evaluate_view, jobs, keep, fail)
-    return [done[job.source.name, job.placement] for job in jobs]

@@ -42,23 +42,54 @@ class Task(Protocol):
         ...
 
 
-class GeneratorTask:
+class _BatchTask:
+    """What the tasks share: a network, where its batches come from, and a fixed held-out batch."""
+
+    def __init__(
+        self,
+        device: torch.device,
+        config: TrainingConfig,
+        batches: BatchMaker,
+        held_out: BatchMaker | None,
+    ):
+        self.config = config
+        self._device = device
+        self._batches = batches
+        self._held_out: Batch | None = None
+        if held_out is not None:
+            rng = np.random.default_rng(HELD_OUT_SEED)
+            self._held_out = held_out.draw(rng, HELD_OUT_VIEWS, HELD_OUT_GRASPS).to(device)
+
+    def _draw(self, rng: np.random.Generator) -> Batch:
+        return self._batches.draw(rng, self.config.views, self.config.grasps).to(self._device)
+
+
+class _SuccessTask(_BatchTask):
+    """The tasks of generators: batches of successful grasps."""
+
+    def __init__(
+        self, device: torch.device, config: TrainingConfig, data: TrainingData, held_out: TrainingData | None
+    ):
+        super().__init__(
+            device,
+            config,
+            BatchMaker.for_generator(data, config.min_local_success, config.min_margin),
+            None if held_out is None else BatchMaker.for_generator(held_out),
+        )
+
+
+class GeneratorTask(_SuccessTask):
     """Reconstruct successful grasps through a Gaussian latent (Eq. 3 and 4)."""
 
     def __init__(
         self, module: FFHGenerator, config: TrainingConfig, data: TrainingData, held_out: TrainingData | None
     ):
+        super().__init__(next(module.parameters()).device, config, data, held_out)
         self.module = module
-        self.config = config
-        self._device = next(module.parameters()).device
-        self._batches = BatchMaker.for_generator(data, config.min_local_success, config.min_margin)
-        self._held_out = None
-        if held_out is not None:
-            self._held_out = _held_out_batch(BatchMaker.for_generator(held_out), self._device)
 
     def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         """Eq. 3 on one batch."""
-        batch = self._batches.draw(rng, self.config.views, self.config.grasps).to(self._device)
+        batch = self._draw(rng)
         noise = torch.randn(*batch.label.shape, self.config.model.latent, device=self._device)
         predicted, latent = self.module(batch.objects, batch.grasps, noise)
         parts = generator_loss(predicted, batch.grasps, latent)
@@ -71,24 +102,18 @@ class GeneratorTask:
         return {} if self._held_out is None else generator_metrics(self.module, self._held_out)
 
 
-class FlowTask:
+class FlowTask(_SuccessTask):
     """Carry noise to successful grasps along straight paths."""
 
     def __init__(
         self, module: FlowGenerator, config: TrainingConfig, data: TrainingData, held_out: TrainingData | None
     ):
+        super().__init__(next(module.parameters()).device, config, data, held_out)
         self.module = module
-        self.config = config
-        self._device = next(module.parameters()).device
-        self._batches = BatchMaker.for_generator(data, config.min_local_success, config.min_margin)
-        self._held_out = None
-        if held_out is not None:
-            self._held_out = _held_out_batch(BatchMaker.for_generator(held_out), self._device)
 
     def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         """Flow matching loss of one batch; noise and times come from torch's global generator."""
-        batch = self._batches.draw(rng, self.config.views, self.config.grasps).to(self._device)
-        total = self._loss(batch)
+        total = self._loss(self._draw(rng))
         return total, {"loss": total.item()}
 
     def metrics(self) -> dict[str, float]:
@@ -110,23 +135,23 @@ class FlowTask:
         return self.module.loss(batch.objects, batch.grasps, noise, time)
 
 
-class EvaluatorTask:
+class EvaluatorTask(_BatchTask):
     """Predict the success of grasps of all kinds (Eq. 5)."""
 
     def __init__(
         self, module: FFHEvaluator, config: TrainingConfig, data: TrainingData, held_out: TrainingData | None
     ):
+        super().__init__(
+            next(module.parameters()).device,
+            config,
+            BatchMaker.for_evaluator(data, config.shares),
+            None if held_out is None else BatchMaker.for_evaluator(held_out, None),
+        )
         self.module = module
-        self.config = config
-        self._device = next(module.parameters()).device
-        self._batches = BatchMaker.for_evaluator(data, config.shares)
-        self._held_out = None
-        if held_out is not None:
-            self._held_out = _held_out_batch(BatchMaker.for_evaluator(held_out, None), self._device)
 
     def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         """Eq. 5 on one batch."""
-        batch = self._batches.draw(rng, self.config.views, self.config.grasps).to(self._device)
+        batch = self._draw(rng)
         logits = self.module(batch.objects, batch.grasps)
         total = evaluator_loss(logits, batch.label, batch.robust, batch.collision)
         return total, {"loss": total.item()}
@@ -168,8 +193,3 @@ def evaluator_metrics(module: FFHEvaluator, batch: Batch) -> dict[str, float]:
         "bce": binary_cross_entropy(label, probability),
         "ece": expected_calibration_error(label, probability),
     }
-
-
-def _held_out_batch(batches: BatchMaker, device: torch.device) -> Batch:
-    rng = np.random.default_rng(HELD_OUT_SEED)
-    return batches.draw(rng, HELD_OUT_VIEWS, HELD_OUT_GRASPS).to(device)

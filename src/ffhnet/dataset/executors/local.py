@@ -9,6 +9,7 @@ import signal
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from multiprocessing.connection import Connection, wait
 from typing import Any, NoReturn
 
@@ -64,20 +65,36 @@ class LocalExecutor:
 
 
 def run_jobs(
-    work: Callable[[Job], Result], jobs: Sequence[Job], workers: int, on_done: Callable[[Result], None]
-) -> None:
-    """Calls `on_done(result)` as each job ends; the first job that fails stops the rest and raises here.
+    work: Callable[[Job], Result], jobs: Sequence[Job], workers: int, on_done: Callable[[], None]
+) -> list[Result]:
+    """Results in the order of the jobs, in whatever order processes end; a failure stops the rest.
+
+    Args:
+        work: what is done with each job.
+        jobs: units of work.
+        workers: processes.
+        on_done: called as each job ends.
 
     Raises:
         FFHNetError: raised by `work`.
         WorkerLostError: a job was given up.
         UnexpectedError: `work` raised something else.
     """
+    results: dict[int, Result] = {}
 
-    def fail(job: Job, error: Exception) -> NoReturn:
+    def done(numbered: tuple[int, Job], result: Result) -> None:
+        results[numbered[0]] = result
+        on_done()
+
+    def fail(numbered: tuple[int, Job], error: Exception) -> NoReturn:
         raise error
 
-    LocalExecutor(workers).run(work, jobs, lambda _, result: on_done(result), fail)
+    LocalExecutor(workers).run(partial(_without_number, work), list(enumerate(jobs)), done, fail)
+    return [results[number] for number in range(len(jobs))]
+
+
+def _without_number(work: Callable[[Job], Result], numbered: tuple[int, Job]) -> Result:
+    return work(numbered[1])
 
 
 class _Worker:
