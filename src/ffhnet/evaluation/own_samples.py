@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from zlib import crc32
 
 import numpy as np
@@ -98,6 +99,4 @@ def try_own_samples(job: OwnSamplesJob) -> list[OwnSamples]:
 @lru_cache(maxsize=1)
 def _load_network(weights: str) -> FFHNet:
     """Networks of a worker process, loaded once, as they are without calibration."""
-    from pathlib import Path
-
     return FFHNet(load_checkpoint(Path(weights)))
