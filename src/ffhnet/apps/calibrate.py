@@ -11,7 +11,7 @@ import tyro
 
 from ffhnet.apps.console import print_table, progress_bar
 from ffhnet.apps.extras import require_sim
-from ffhnet.errors import OptionError
+from ffhnet.errors import OptionError, SceneError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -78,6 +78,10 @@ def run(options: CalibrateOptions) -> None:
         found = run_jobs(try_own_samples, jobs, options.workers, step)
     fitting = [view for views in found[: options.fit] for view in views]
     record = [view for views in found[options.fit :] for view in views]
+    if not fitting or not record:
+        raise SceneError(
+            "no view of the objects on one side of --fit could be told from the table"
+        )
     ids = np.repeat([view.object_name for view in fitting], [len(view.success) for view in fitting])
     success, held = _joined(fitting, "success"), _joined(fitting, "held")
     nominal = fit_calibration(ids, _joined(fitting, "probability"), success)

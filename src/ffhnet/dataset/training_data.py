@@ -11,6 +11,20 @@ from jaxtyping import Bool, Float, Int
 
 from ffhnet.errors import DatasetError
 
+TRIAL_FIELDS = (
+    "trial_placement",
+    "rotation",
+    "position",
+    "joints",
+    "closed_joints",
+    "margin",
+    "label",
+    "robust",
+    "executed",
+    "proposer",
+)
+"""Attributes of `TrainingData` with one row per trial."""
+
 
 @dataclass(frozen=True)
 class TrainingData:
@@ -128,25 +142,21 @@ class TrainingData:
         placements = mask[self.placement_object]
         new_placement = np.cumsum(placements) - 1
         views, trials = placements[self.view_placement], placements[self.trial_placement]
+        kept = self.select_trials(trials)
         return dataclasses.replace(
-            self,
-            object_names=tuple(n for n, kept in zip(self.object_names, mask, strict=True) if kept),
+            kept,
+            object_names=tuple(n for n, chosen in zip(self.object_names, mask, strict=True) if chosen),
             placement_object=new_object[self.placement_object[placements]],
             view_placement=new_placement[self.view_placement[views]],
             bps=self.bps[views],
             table_height=self.table_height[views],
             T_world_view=self.T_world_view[views],
-            trial_placement=new_placement[self.trial_placement[trials]],
-            rotation=self.rotation[trials],
-            position=self.position[trials],
-            joints=self.joints[trials],
-            closed_joints=self.closed_joints[trials],
-            margin=self.margin[trials],
-            label=self.label[trials],
-            robust=self.robust[trials],
-            executed=self.executed[trials],
-            proposer=self.proposer[trials],
+            trial_placement=new_placement[kept.trial_placement],
         )
+
+    def select_trials(self, keep: Bool[np.ndarray, " T"]) -> TrainingData:
+        """All objects and views with some of the trials."""
+        return dataclasses.replace(self, **{name: getattr(self, name)[keep] for name in TRIAL_FIELDS})
 
 
 def _check_indices(name: str, index: np.ndarray, size: int) -> None:

@@ -70,12 +70,13 @@ def try_own_samples(job: OwnSamplesJob) -> list[OwnSamples]:
     torch.set_num_threads(1)
     network, obj = _load_network(job.weights), job.source.load()
     trial = GraspTrial(build_scene(load_hand(network.info.hand), obj))
+    makers = [ViewMaker(obj, pose) for pose in obj.resting_poses[: job.views]]
     found = []
     for number in range(job.views):
         rng = np.random.default_rng([job.seed, crc32(obj.name.encode()), number])
-        T_world_object = obj.resting_poses[number % len(obj.resting_poses)]
+        T_world_object = obj.resting_poses[number % len(makers)]
         try:
-            view = ViewMaker(obj, T_world_object).take(rng)
+            view = makers[number % len(makers)].take(rng)
         except SceneError:
             continue
         ranked = network.grasp(view.observation, job.samples, seed=int(rng.integers(2**31)))
