@@ -135,7 +135,9 @@ def main(options: Options) -> None:
 
 def measure(name: Network, data: TrainingData, steps: int) -> dict[str, float]:
     """Medians over the steps of both loops."""
-    config = TrainingConfig.default(len(data.joint_names))
+    config = TrainingConfig.default(
+        "evaluator" if name == "evaluator" else "generator", len(data.joint_names)
+    )
     if name != "evaluator":
         config = dataclasses.replace(config, model=dataclasses.replace(config.model, generator=name))
     points = surface_points(load_hand(data.hand), config.model.palm_points)

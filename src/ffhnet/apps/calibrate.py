@@ -79,9 +79,7 @@ def run(options: CalibrateOptions) -> None:
     fitting = [view for views in found[: options.fit] for view in views]
     record = [view for views in found[options.fit :] for view in views]
     if not fitting or not record:
-        raise SceneError(
-            "no view of the objects on one side of --fit could be told from the table"
-        )
+        raise SceneError("no view of the objects on one side of --fit could be told from the table")
     ids = np.repeat([view.object_name for view in fitting], [len(view.success) for view in fitting])
     success, held = _joined(fitting, "success"), _joined(fitting, "held")
     nominal = fit_calibration(ids, _joined(fitting, "probability"), success)

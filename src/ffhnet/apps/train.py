@@ -14,6 +14,7 @@ from ffhnet.apps.extras import require_sim
 from ffhnet.errors import OptionError
 
 if TYPE_CHECKING:
+    from ffhnet.training.config import Network, TrainingConfig
     from ffhnet.training.processes import Processes
 
 
@@ -39,7 +40,7 @@ class TrainOptions:
     start: Annotated[Path | None, absent("DIR")] = None
     """Weights to go on from."""
     steps: Annotated[int | None, absent("N", "the preset's")] = None
-    """Optimiser steps of each network."""
+    """Optimiser steps of each network; by default 4000 of the generator and 2200 of the evaluator."""
     seed: int = 0
     """Seed of initial weights, batches and noise."""
     threads: int = field(default_factory=lambda: _cores_per_process())
@@ -62,16 +63,24 @@ def run(options: TrainOptions) -> None:
         _train(options, processes)
 
 
-def _train(options: TrainOptions, processes: Processes) -> None:
+def _config(options: TrainOptions, network: Network) -> TrainingConfig:
+    """The preset's run of a network, with what the options change."""
     import dataclasses
 
+    from ffhnet.training.config import TrainingConfig
+
+    preset = TrainingConfig.paper() if options.preset == "paper" else TrainingConfig.default(network)
+    model = dataclasses.replace(preset.model, generator=options.generator or preset.model.generator)
+    return dataclasses.replace(preset, model=model, steps=options.steps or preset.steps, seed=options.seed)
+
+
+def _train(options: TrainOptions, processes: Processes) -> None:
     import torch
 
     from ffhnet.dataset.records import read_training_data
     from ffhnet.hands import load_hand
     from ffhnet.hands.surface_points import surface_points
     from ffhnet.model.checkpoint import load_checkpoint, read_info
-    from ffhnet.training.config import TrainingConfig
     from ffhnet.training.train import train_evaluator, train_generator
 
     if options.threads < 1 or (options.steps is not None and options.steps < 1):
@@ -80,20 +89,19 @@ def _train(options: TrainOptions, processes: Processes) -> None:
     data = read_training_data(list(options.data))
     val = None if options.val is None else read_training_data([options.val])
     start = None if options.start is None else load_checkpoint(options.start, hand=data.hand)
-    config = TrainingConfig.paper() if options.preset == "paper" else TrainingConfig.default()
-    model = dataclasses.replace(config.model, generator=options.generator or config.model.generator)
-    config = dataclasses.replace(config, model=model, steps=options.steps or config.steps, seed=options.seed)
+    generator, evaluator = _config(options, "generator"), _config(options, "evaluator")
     hand = load_hand(data.hand)
     limits = (hand.lower.tolist(), hand.upper.tolist())
-    points = surface_points(hand, config.model.palm_points) if config.model.palm_points else None
+    count = generator.model.palm_points
+    points = surface_points(hand, count) if count else None
     if processes.first:
         print(f"{len(data.object_names)} objects, {data.num_views} views, {data.num_trials} trials")
     if options.networks != "evaluator":
         begin = None if start is None else start.generator
-        train_generator(data, val, config, options.out, limits, points, begin, processes=processes)
+        train_generator(data, val, generator, options.out, limits, points, begin, processes=processes)
     if options.networks != "generator":
         judge = None if start is None else start.evaluator
-        train_evaluator(data, val, config, options.out, limits, points, judge, processes=processes)
+        train_evaluator(data, val, evaluator, options.out, limits, points, judge, processes=processes)
     if processes.first and val is not None:
         summary = read_info(options.out).training
         rows = [
