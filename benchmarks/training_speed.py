@@ -135,11 +135,11 @@ def main(options: Options) -> None:
 
 def measure(name: Network, data: TrainingData, steps: int) -> dict[str, float]:
     """Medians over the steps of both loops."""
-    config = TrainingConfig.default(
-        "evaluator" if name == "evaluator" else "generator", len(data.joint_names)
-    )
-    if name != "evaluator":
-        config = dataclasses.replace(config, model=dataclasses.replace(config.model, generator=name))
+    joints = len(data.joint_names)
+    if name == "cvae":
+        config = TrainingConfig.cvae(joints)
+    else:
+        config = TrainingConfig.default("evaluator" if name == "evaluator" else "teacher", joints)
     points = surface_points(load_hand(data.hand), config.model.palm_points)
     raw = dataclasses.replace(config, model=dataclasses.replace(config.model, pca_components=None))
     loops = {

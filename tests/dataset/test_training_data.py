@@ -65,7 +65,8 @@ def test_parts_add_up_to_the_whole(data: TrainingData):
 
 def test_select_trials_keeps_rows_together(data: TrainingData):
     chosen = data.select_trials(data.executed)
-    assert chosen.executed.all() and 0 < chosen.num_trials < data.num_trials
+    assert chosen.executed.all()
+    assert 0 < chosen.num_trials < data.num_trials
     np.testing.assert_array_equal(chosen.position, data.position[data.executed])
     np.testing.assert_array_equal(chosen.trial_placement, data.trial_placement[data.executed])
     assert chosen.num_views == data.num_views

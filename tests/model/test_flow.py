@@ -50,7 +50,7 @@ def test_state_holds_a_grasp_without_loss():
     module.set_statistics(wanted)
     state = (module._raw(wanted) - module.mean) / module.deviation
     torch.testing.assert_close(state.flatten(0, 1).mean(0), torch.zeros(11), atol=1e-5, rtol=0)
-    back = module._grasps(state)
+    back = module.grasps(state)
     for name in ("rotation", "position", "joints"):
         torch.testing.assert_close(getattr(back, name), getattr(wanted, name), atol=1e-5, rtol=0)
 

@@ -120,11 +120,16 @@ def load_checkpoint(folder: Path, hand: str | None = None, device: torch.device 
         raise WeightsError(f"wanted weights for hand {hand!r}, {folder} holds weights for {info.hand!r}")
     generator: Generator
     generator = FlowGenerator(info.model) if info.model.generator == "flow" else FFHGenerator(info.model)
+    _load_weights(folder, GENERATOR_FILE, digests, generator)
+    return Checkpoint(info, generator.to(device).eval(), load_evaluator(folder, device))
+
+
+def load_evaluator(folder: Path, device: torch.device | str = "cpu") -> FFHEvaluator:
+    """The evaluator of a folder that may have no generator yet. Raises WeightsError."""
+    info, digests = _read_config(folder)
     evaluator = FFHEvaluator(info.model)
-    for name, network in ((GENERATOR_FILE, generator), (EVALUATOR_FILE, evaluator)):
-        _load_weights(folder / name, digests.get(name), network)
-        network.to(device).eval()
-    return Checkpoint(info, generator, evaluator)
+    _load_weights(folder, EVALUATOR_FILE, digests, evaluator)
+    return evaluator.to(device).eval()
 
 
 def read_info(folder: Path) -> CheckpointInfo:
@@ -162,7 +167,8 @@ def _read_config(folder: Path) -> tuple[CheckpointInfo, dict[str, str]]:
         raise WeightsError(f"{path} is not a checkpoint description: {error}") from error
 
 
-def _load_weights(path: Path, digest: str | None, network: nn.Module) -> None:
+def _load_weights(folder: Path, name: str, digests: dict[str, str], network: nn.Module) -> None:
+    path, digest = folder / name, digests.get(name)
     if not path.is_file() or digest is None:
         raise WeightsError(f"{path.name} is missing in {path.parent}")
     data = path.read_bytes()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Literal
 
@@ -35,6 +36,7 @@ class ModelConfig:
         flow_width: width of the flow's blocks.
         flow_blocks: number of them.
         flow_steps: steps from noise to grasp.
+        flow_palm_points: how many of the palm points the flow reads, the first ones; all if there are fewer.
     """
 
     num_joints: int = 15
@@ -55,17 +57,19 @@ class ModelConfig:
     dropout: float = 0.3
     palm_points: int = 96
     judge_robustness: bool = True
-    flow_width: int = 384
-    flow_blocks: int = 4
-    flow_steps: int = 8
+    flow_width: int = 256
+    flow_blocks: int = 2
+    flow_steps: int = 2
+    flow_palm_points: int = 48
 
     def __post_init__(self) -> None:
         widths = (self.inner_width, self.width, self.flow_width)
         sizes = (self.num_joints, self.bps_size, self.latent, *widths, self.flow_blocks, self.flow_steps)
         if min(sizes) < 1:
             raise OptionError(f"all sizes of ModelConfig must be at least 1, got {sizes}")
-        if self.palm_points < 0:
-            raise OptionError(f"palm_points must be at least 0, got {self.palm_points}")
+        if min(self.palm_points, self.flow_palm_points) < 0:
+            counts = (self.palm_points, self.flow_palm_points)
+            raise OptionError(f"palm_points and flow_palm_points must be at least 0, got {counts}")
         if not 0 < self.temperature <= 2:
             raise OptionError(f"the temperature must lie above 0 and up to 2, got {self.temperature}")
         if self.generator not in ("cvae", "flow"):
@@ -99,6 +103,12 @@ class ModelConfig:
             temperature=1.0,
             palm_points=0,
             judge_robustness=False,
+        )
+
+    def teacher(self) -> ModelConfig:
+        """The larger flow from which a flow of few steps is distilled; everything else is the same."""
+        return dataclasses.replace(
+            self, flow_width=384, flow_blocks=4, flow_steps=8, flow_palm_points=self.palm_points
         )
 
     @property

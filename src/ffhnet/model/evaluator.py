@@ -38,7 +38,7 @@ class FFHEvaluator(nn.Module):
         self.config = config
         grasp, condition, width = config.grasp_width(config.use_joints), config.condition_width, config.width
         self.condition = ObjectCondition(config)
-        self.geometry = local_geometry(config)
+        self.geometry = local_geometry(config, config.palm_points)
         self.grasp_norm = GroupedBatchNorm(grasp) if config.input_batch_norm else nn.Identity()
         self.condition_norm = GroupedBatchNorm(condition) if config.input_batch_norm else nn.Identity()
         own = grasp if self.geometry is None else grasp + self.geometry.width

@@ -8,6 +8,7 @@ field around the palm pose reached so far.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import torch
 from jaxtyping import Float
@@ -61,7 +62,7 @@ class FlowGenerator(nn.Module):
         self.config = config
         self.state_width = 9 + config.num_joints
         self.condition = ObjectCondition(config)
-        self.geometry = local_geometry(config)
+        self.geometry = local_geometry(config, config.flow_palm_points)
         local = 0 if self.geometry is None else self.geometry.width
         width = config.flow_width
         self.object_layer = nn.Linear(config.condition_width, CONDITION_WIDTH)
@@ -81,6 +82,14 @@ class FlowGenerator(nn.Module):
         rows = self._raw(grasps).flatten(0, 1)
         self.mean.copy_(rows.mean(dim=0))
         self.deviation.copy_(rows.std(dim=0).clamp(min=1e-3))
+
+    def take_constants(self, other: FlowGenerator) -> None:
+        """Take over what training does not change: projection, statistics, and its share of palm points."""
+        self.condition.load_state_dict(other.condition.state_dict())
+        self.mean.copy_(other.mean)
+        self.deviation.copy_(other.deviation)
+        if self.geometry is not None and other.geometry is not None:
+            self.geometry.points.copy_(other.geometry.points[: len(self.geometry.points)])
 
     def loss(
         self,
@@ -103,28 +112,31 @@ class FlowGenerator(nn.Module):
             num: grasps per view.
             source: of the noise, on the CPU.
         """
-        views, device = len(objects.bps), objects.bps.device
-        noise = torch.randn(views, num, self.state_width, generator=source)
-        x = self.config.temperature * noise.to(device)
-        view = self._look(objects)
-        steps = self.config.flow_steps
+        noise = torch.randn(len(objects.bps), num, self.state_width, generator=source)
+        *_, last = self.path(objects, self.config.temperature * noise.to(objects.bps.device))
+        return self.grasps(last)
+
+    def path(self, objects: ObjectTensors, noise: Float[Tensor, "V G S"]) -> Iterator[Float[Tensor, "V G S"]]:
+        """The states after each of the `flow_steps` steps; the last is a grasp."""
+        view, x, steps = self._look(objects), noise, self.config.flow_steps
         for step in range(steps):
-            time = torch.full((views,), step / steps, device=device)
+            time = torch.full((len(noise),), step / steps, device=noise.device)
             x = x + self._velocity(view, x, time) / steps
-        return self._grasps(x)
+            yield x
 
-    def _raw(self, grasps: GraspTensors) -> Float[Tensor, "V G S"]:
-        position = grasps.position / self.config.position_scale
-        joints = grasps.joints / self.config.joint_scale
-        return torch.cat([rotation_to_6d(grasps.rotation), position, joints], dim=-1)
-
-    def _grasps(self, x: Float[Tensor, "V G S"]) -> GraspTensors:
+    def grasps(self, x: Float[Tensor, "V G S"]) -> GraspTensors:
+        """The grasps that states stand for; joint angles are not clipped."""
         raw = x * self.deviation + self.mean
         return GraspTensors(
             rotation=rotation_from_6d(raw[..., :6]),
             position=raw[..., 6:9] * self.config.position_scale,
             joints=raw[..., 9:] * self.config.joint_scale,
         )
+
+    def _raw(self, grasps: GraspTensors) -> Float[Tensor, "V G S"]:
+        position = grasps.position / self.config.position_scale
+        joints = grasps.joints / self.config.joint_scale
+        return torch.cat([rotation_to_6d(grasps.rotation), position, joints], dim=-1)
 
     def _look(self, objects: ObjectTensors) -> tuple[ObjectTensors, Tensor, Tensor | None]:
         """What all steps share: the objects, their embedding and their distance fields."""
@@ -143,7 +155,7 @@ class FlowGenerator(nn.Module):
         context = functional.silu(embedded + clock).unsqueeze(1)
         seen = x
         if self.geometry is not None and grid is not None:
-            seen = torch.cat([x, self.geometry(grid, objects, self._grasps(x))], dim=-1)
+            seen = torch.cat([x, self.geometry(grid, objects, self.grasps(x))], dim=-1)
         hidden = self.first(seen)
         for block in self.blocks:
             hidden = block(hidden, context)

@@ -124,8 +124,7 @@ def _plane_fit(basis: Float[np.ndarray, "D 3"]) -> tuple[Int[np.ndarray, "M k"],
     return index, np.where(inside, weight, closeness)
 
 
-def local_geometry(config: ModelConfig) -> LocalGeometry | None:
-    """The module of a model, or None where it has no such features."""
-    if config.palm_points == 0:
-        return None
-    return LocalGeometry(config.palm_points, config.bps_size, config.use_table_height)
+def local_geometry(config: ModelConfig, count: int) -> LocalGeometry | None:
+    """The module with the first `count` of a model's palm points, or None if that leaves none."""
+    count = min(count, config.palm_points)
+    return LocalGeometry(count, config.bps_size, config.use_table_height) if count else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass, field
 from typing import Literal
@@ -10,10 +11,14 @@ from ffhnet.errors import OptionError
 from ffhnet.model.config import ModelConfig
 from ffhnet.model.losses import JOINTS_WEIGHT, KL_WEIGHT
 
-Network = Literal["generator", "evaluator"]
+Network = Literal["teacher", "evaluator", "generator"]
+"""What is trained, in this order: the teacher is the flow from which the generator is distilled."""
 
-STEPS: dict[Network, int] = {"generator": 4000, "evaluator": 2200}
-"""Of the project's own preset: a flow learns slower than a classifier."""
+STEPS: dict[Network, int] = {"teacher": 3000, "evaluator": 2200, "generator": 1500}
+"""Of the project's own preset."""
+
+CVAE_STEPS = 4000
+"""Likewise, of a generator that has no teacher."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +67,9 @@ class TrainingConfig:
             its parts equal magnitude (III-B); with joints that are reached, not asked for, 1 does.
         min_local_success: the generator leaves out successes among whose neighbours fewer succeed.
         min_margin: the generator leaves out successes with a smaller margin to start collisions.
+        pairs: paths of the teacher per view (distillation).
+        guidance: weight of what the evaluator says of the student's grasps (distillation).
+        guidance_start: share of the run before that.
         shares: make-up of the evaluator's batches, or None to draw trials as they are in the data.
         seed: of the initial weights, batches and noise.
         metrics_every: steps between measurements on held-out data.
@@ -82,24 +90,33 @@ class TrainingConfig:
     joints_weight: float = 1.0
     min_local_success: float = 0.3
     min_margin: float = 0.5
+    pairs: int = 32
+    guidance: float = 0.5
+    guidance_start: float = 0.3
     shares: ClassShares | None = field(default_factory=ClassShares)
     seed: int = 0
     metrics_every: int = 200
     state_every: int = 200
 
     def __post_init__(self) -> None:
-        counts = (self.steps, self.views, self.grasps, self.metrics_every, self.state_every)
+        counts = (self.steps, self.views, self.grasps, self.pairs, self.metrics_every, self.state_every)
         if min(counts) < 1:
-            raise OptionError(
-                f"steps, views, grasps, metrics_every, state_every must be at least 1, got {counts}"
-            )
+            names = "steps, views, grasps, pairs, metrics_every, state_every"
+            raise OptionError(f"{names} must be at least 1, got {counts}")
         if not 0 <= self.kl_start <= self.kl_full <= 1:
             raise OptionError(f"0 <= kl_start <= kl_full <= 1 is wanted, got {self.kl_start}, {self.kl_full}")
 
     @classmethod
     def default(cls, network: Network, num_joints: int = 15) -> TrainingConfig:
-        """The project's own preset: both networks in a quarter of an hour on two cores."""
-        return cls(model=ModelConfig.default(num_joints), steps=STEPS[network])
+        """The project's own preset: all three networks in a quarter of an hour on two cores."""
+        model = ModelConfig.default(num_joints)
+        return cls(model=model.teacher() if network == "teacher" else model, steps=STEPS[network])
+
+    @classmethod
+    def cvae(cls, num_joints: int = 15) -> TrainingConfig:
+        """The project's own preset of the paper's generator."""
+        model = dataclasses.replace(ModelConfig.default(num_joints), generator="cvae")
+        return cls(model=model, steps=CVAE_STEPS)
 
     @classmethod
     def paper(cls, num_joints: int = 15) -> TrainingConfig:

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+import torch
 from jaxtyping import Float
-from torch import nn
 
 from ffhnet.dataset.training_data import TrainingData
-from ffhnet.errors import DatasetError, OptionError, WeightsError
+from ffhnet.errors import DatasetError, OptionError
 from ffhnet.model.checkpoint import CheckpointInfo, Generator, save_checkpoint
 from ffhnet.model.config import ModelConfig
 from ffhnet.model.evaluator import FFHEvaluator
@@ -22,6 +22,7 @@ from ffhnet.model.generator import FFHGenerator
 from ffhnet.model.pca import fit_projection
 from ffhnet.training.batches import BatchMaker
 from ffhnet.training.config import TrainingConfig
+from ffhnet.training.distillation import DistillationTask
 from ffhnet.training.loop import fit, seeded
 from ffhnet.training.processes import ALONE, Processes
 from ffhnet.training.tasks import EvaluatorTask, FlowTask, GeneratorTask, Task
@@ -39,7 +40,6 @@ def train_generator(
     out_dir: Path,
     joint_limits: tuple[Sequence[float], Sequence[float]],
     palm_points: Float[np.ndarray, "K 3"] | None = None,
-    start: Generator | None = None,
     progress: bool = True,
     processes: Processes = ALONE,
 ) -> Generator:
@@ -52,7 +52,6 @@ def train_generator(
         out_dir: gets the checkpoint, a log and a state file; an interrupted run goes on from the latter.
         joint_limits: lower and upper limits in radians, in the order of `data.joint_names`.
         palm_points: where around the hand the networks look (m, palm frame), for models that do.
-        start: network to go on from instead of random weights; it is not changed.
         progress: show a progress bar.
         processes: those that train this network together, and where; each calls this with the same
             arguments, draws its part of the batch, and gets the same network. Process 0 writes.
@@ -66,11 +65,50 @@ def train_generator(
     task: Task
     module: Generator
     if config.model.generator == "flow":
-        module = initial_network(FlowGenerator, data, config, start, palm_points).to(processes.device)
+        module = initial_network(FlowGenerator, data, config, palm_points).to(processes.device)
         task = FlowTask(module, part, data, val)
     else:
-        module = initial_network(FFHGenerator, data, config, start, palm_points).to(processes.device)
+        module = initial_network(FFHGenerator, data, config, palm_points).to(processes.device)
         task = GeneratorTask(module, part, data, val)
+    metrics = fit(task, config, out_dir, "generator", progress, processes)
+    if processes.first:
+        info = _info(data, config, joint_limits, "generator", metrics)
+        save_checkpoint(out_dir, info, generator=module, half=True)
+    return module
+
+
+def distill_generator(
+    data: TrainingData,
+    val: TrainingData | None,
+    config: TrainingConfig,
+    out_dir: Path,
+    joint_limits: tuple[Sequence[float], Sequence[float]],
+    teacher: FlowGenerator,
+    evaluator: FFHEvaluator,
+    progress: bool = True,
+    processes: Processes = ALONE,
+) -> FlowGenerator:
+    """Distil the flow of `config.model` from a larger one, guided by an evaluator (`distillation.py`).
+
+    Args:
+        data: views to learn on.
+        val: held-out views for metrics, or None.
+        config: architecture and run.
+        out_dir: as for `train_generator`.
+        joint_limits: lower and upper limits in radians.
+        teacher: a trained flow, which gives projection, statistics and palm points; it is not changed.
+        evaluator: trained; it is not changed.
+        progress: show a progress bar.
+        processes: as for `train_generator`.
+    """
+    _check_data(data, config.model)
+    with seeded(config.seed):
+        module = FlowGenerator(config.model).to(processes.device)
+    module.take_constants(teacher)
+    part = dataclasses.replace(config, views=processes.share(config.views))
+    lower, upper = (torch.tensor(limit, dtype=torch.float32) for limit in joint_limits)
+    judge = copy.deepcopy(evaluator)
+    task = DistillationTask(module, teacher, judge, (lower, upper), part, data, val)
     metrics = fit(task, config, out_dir, "generator", progress, processes)
     if processes.first:
         info = _info(data, config, joint_limits, "generator", metrics)
@@ -85,13 +123,12 @@ def train_evaluator(
     out_dir: Path,
     joint_limits: tuple[Sequence[float], Sequence[float]],
     palm_points: Float[np.ndarray, "K 3"] | None = None,
-    start: FFHEvaluator | None = None,
     progress: bool = True,
     processes: Processes = ALONE,
 ) -> FFHEvaluator:
     """Train an FFHEvaluator on all trials in `data` and write it to `out_dir`; else as `train_generator`."""
     _check_data(data, config.model)
-    module = initial_network(FFHEvaluator, data, config, start, palm_points).to(processes.device)
+    module = initial_network(FFHEvaluator, data, config, palm_points).to(processes.device)
     part = dataclasses.replace(config, views=processes.share(config.views))
     metrics = fit(EvaluatorTask(module, part, data, val), config, out_dir, "evaluator", progress, processes)
     if processes.first:
@@ -104,14 +141,9 @@ def initial_network(
     kind: type[Network],
     data: TrainingData,
     config: TrainingConfig,
-    start: nn.Module | None,
     palm_points: Float[np.ndarray, "K 3"] | None,
 ) -> Network:
     """The network to begin with; what is fixed during training is fitted to the data."""
-    if start is not None:
-        if not isinstance(start, kind):
-            raise WeightsError(f"wanted to go on from a {kind.__name__}, got a {type(start).__name__}")
-        return copy.deepcopy(start)
     with seeded(config.seed):
         module = kind(config.model)
     if config.model.pca_components is not None:
@@ -122,7 +154,7 @@ def initial_network(
             raise OptionError(
                 f"this model looks at {config.model.palm_points} points around the palm, got none"
             )
-        geometry.set_points(palm_points)
+        geometry.set_points(palm_points[: len(geometry.points)])
     if isinstance(module, FlowGenerator):
         batches = BatchMaker.for_generator(data, config.min_local_success, config.min_margin)
         rng = np.random.default_rng(config.seed)

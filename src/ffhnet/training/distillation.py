@@ -1,0 +1,126 @@
+"""A flow of few steps learns to end where a larger one ends, and then to please the evaluator.
+
+Two losses. The *student* starts from the same noise as its *teacher* and shall be where the teacher is at the
+student's times (progressive distillation, Salimans and Ho 2022, with the student's own states as inputs).
+Later the evaluator joins in: its gradient with respect to the grasp moves samples away from collisions and
+towards grasps that hold. The first loss keeps their variety.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+from torch.nn import functional
+
+from ffhnet.dataset.training_data import TrainingData
+from ffhnet.errors import OptionError
+from ffhnet.model.evaluator import FFHEvaluator
+from ffhnet.model.flow import FlowGenerator
+from ffhnet.model.tensors import GraspTensors, ObjectTensors
+from ffhnet.training.config import TrainingConfig
+from ffhnet.training.loop import seeded
+
+CHUNK = 16
+"""Views whose paths the teacher computes at once."""
+
+HELD_OUT_VIEWS, HELD_OUT_GRASPS = 128, 32
+"""Size of the held-out measurement."""
+
+
+class DistillationTask:
+    """Learn a teacher's paths on the views of a data set, guided by an evaluator.
+
+    Args:
+        module: the student; it and the teacher standardise states alike.
+        teacher: a flow whose number of steps is a multiple of the student's.
+        evaluator: rates what the student proposes; neither it nor the teacher changes.
+        joint_limits: lower and upper limits (rad): the evaluator sees joints clipped to them.
+        config: the run; all processes of it see all `pairs`.
+        data: views to learn from; their trials are not looked at.
+        held_out: views to measure on, or None.
+    """
+
+    def __init__(
+        self,
+        module: FlowGenerator,
+        teacher: FlowGenerator,
+        evaluator: FFHEvaluator,
+        joint_limits: tuple[Float[Tensor, " J"], Float[Tensor, " J"]],
+        config: TrainingConfig,
+        data: TrainingData,
+        held_out: TrainingData | None,
+    ):
+        steps, taught = module.config.flow_steps, teacher.config.flow_steps
+        if taught % steps:
+            raise OptionError(f"a teacher of {taught} steps cannot teach {steps}: wanted a multiple")
+        self.module = module
+        self.config = config
+        self._device = next(module.parameters()).device
+        self._evaluator = evaluator.to(self._device).eval().requires_grad_(False)
+        self._lower, self._upper = (limit.to(self._device) for limit in joint_limits)
+        self._data = data
+        self._held_out = held_out
+        self._states = self._teach(teacher.to(self._device).eval())
+
+    def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
+        """Distance to the teacher's states and, after the start, what the evaluator says of the grasps."""
+        views = rng.choice(self._data.num_views, self.config.views)
+        pairs = rng.choice(self.config.pairs, min(self.config.grasps, self.config.pairs), replace=False)
+        noise, *wanted = torch.from_numpy(self._states[views][:, :, pairs]).float().to(self._device).unbind(1)
+        objects = self._objects(self._data, views)
+        reached = list(self.module.path(objects, noise))
+        distance = torch.stack(
+            [functional.mse_loss(x, goal) for x, goal in zip(reached, wanted, strict=True)]
+        ).mean()
+        if step < self.config.guidance_start * self.config.steps:
+            return distance, {"loss": distance.item(), "distance": distance.item()}
+        blame = self._blame(objects, reached[-1])
+        total = distance + self.config.guidance * blame
+        return total, {"loss": total.item(), "distance": distance.item(), "blame": blame.item()}
+
+    def metrics(self) -> dict[str, float]:
+        """What the evaluator says of samples on held-out views."""
+        if self._held_out is None:
+            return {}
+        self.module.eval()
+        with torch.inference_mode(), seeded(self.config.seed) as rng:
+            views = rng.choice(self._held_out.num_views, HELD_OUT_VIEWS)
+            noise = self._noise(HELD_OUT_VIEWS, HELD_OUT_GRASPS)
+            *_, last = self.module.path(self._objects(self._held_out, views), noise)
+            blame = self._blame(self._objects(self._held_out, views), last).item()
+        self.module.train()
+        return {"blame": blame}
+
+    def _teach(self, teacher: FlowGenerator) -> Float[np.ndarray, "V K P S"]:
+        """Noise and the teacher's states at the student's times, P for each view."""
+        count, every = self._data.num_views, teacher.config.flow_steps // self.module.config.flow_steps
+        shape = (count, 1 + self.module.config.flow_steps, self.config.pairs, teacher.state_width)
+        states = np.empty(shape, np.float16)
+        with torch.inference_mode(), seeded(self.config.seed):
+            for first in range(0, count, CHUNK):
+                views = np.arange(first, min(first + CHUNK, count))
+                noise = self._noise(len(views), self.config.pairs)
+                path = list(teacher.path(self._objects(self._data, views), noise))[every - 1 :: every]
+                states[views] = torch.stack([noise, *path], dim=1).half().cpu().numpy()
+        return states
+
+    def _noise(self, views: int, grasps: int) -> Float[Tensor, "V G S"]:
+        """What samples start from, as in use."""
+        noise = torch.randn(views, grasps, self.module.state_width)
+        return (self.module.config.temperature * noise).to(self._device)
+
+    def _blame(self, objects: ObjectTensors, states: Float[Tensor, "V G S"]) -> Float[Tensor, ""]:
+        """Mean negative logarithm of the probability that a grasp holds, over the evaluator's outputs."""
+        raw = self.module.grasps(states)
+        grasps = GraspTensors(raw.rotation, raw.position, raw.joints.clamp(self._lower, self._upper))
+        logits = self._evaluator(objects, grasps)
+        outputs = [logits.success] if logits.robust is None else [logits.success, logits.robust]
+        return torch.stack([functional.softplus(-output).mean() for output in outputs]).mean()
+
+    def _objects(self, data: TrainingData, views: np.ndarray) -> ObjectTensors:
+        def tensor(array: np.ndarray) -> Tensor:
+            return torch.from_numpy(array[views].astype(np.float32)).to(self._device)
+
+        return ObjectTensors(tensor(data.bps), tensor(data.table_height))

@@ -1,0 +1,115 @@
+"""A flow of two steps learns from one of many, and from what the evaluator says."""
+
+import copy
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from ffhnet.dataset.training_data import TrainingData
+from ffhnet.errors import OptionError
+from ffhnet.model.config import ModelConfig
+from ffhnet.model.evaluator import FFHEvaluator
+from ffhnet.model.flow import FlowGenerator
+from ffhnet.training import TrainingConfig, distill_generator, train_evaluator, train_generator
+from ffhnet.training.distillation import DistillationTask
+
+MakeWorld = Callable[..., TrainingData]
+Limits = tuple[tuple[float, ...], tuple[float, ...]]
+
+
+@pytest.fixture(scope="module")
+def run() -> TrainingConfig:
+    return TrainingConfig(steps=200, views=16, grasps=16, pairs=16, metrics_every=100, state_every=60)
+
+
+@pytest.fixture(scope="module")
+def trained(
+    tmp_path_factory: pytest.TempPathFactory, run: TrainingConfig
+) -> tuple[FlowGenerator, FFHEvaluator]:
+    from conftest import JOINT_LIMITS, MODEL, point_world
+
+    data, folder = point_world(0, objects=100), tmp_path_factory.mktemp("teacher")
+    config = replace(
+        run, views=32, grasps=32, steps=300, model=replace(MODEL, generator="flow", flow_steps=8)
+    )
+    teacher = train_generator(data, None, config, folder, JOINT_LIMITS, progress=False)
+    assert isinstance(teacher, FlowGenerator)
+    return teacher, train_evaluator(data, None, config, folder, JOINT_LIMITS, progress=False)
+
+
+@pytest.fixture
+def student(model: ModelConfig, run: TrainingConfig) -> TrainingConfig:
+    return replace(run, model=replace(model, generator="flow", flow_steps=2, flow_width=48))
+
+
+def test_guidance_makes_grasps_that_the_evaluator_believes_in(
+    tmp_path: Path,
+    make_world: MakeWorld,
+    student: TrainingConfig,
+    joint_limits: Limits,
+    trained: tuple[FlowGenerator, FFHEvaluator],
+):
+    teacher, evaluator = trained
+    before = [copy.deepcopy(network.state_dict()) for network in trained]
+    data, val = make_world(0, objects=100), make_world(1)
+    blame = {}
+    for guidance in (0.0, 0.5):
+        out = tmp_path / str(guidance)
+        config = replace(student, guidance=guidance)
+        module = distill_generator(data, val, config, out, joint_limits, *trained, progress=False)
+        blame[guidance] = json.loads((out / "config.json").read_text())["training"]["generator"]["held_out"][
+            "blame"
+        ]
+        rows = [json.loads(line) for line in (out / "generator_log.jsonl").open()]
+        distance = [row["distance"] for row in rows if "distance" in row]
+        if guidance == 0:
+            assert distance[-1] < 0.3 * distance[0]
+        assert ["blame" in row for row in rows if "loss" in row][::6] == [False, True, True, True]
+    assert blame[0.5] < 0.8 * blame[0.0]
+    assert module.config.flow_steps == 2
+    for network, old in zip((teacher, evaluator), before, strict=True):
+        assert all(torch.equal(old[name], tensor) for name, tensor in network.state_dict().items())
+        assert all(parameter.requires_grad for parameter in network.parameters())
+
+
+def test_a_killed_distillation_resumes_to_the_same_weights(
+    tmp_path: Path,
+    make_world: MakeWorld,
+    student: TrainingConfig,
+    joint_limits: Limits,
+    trained: tuple[FlowGenerator, FFHEvaluator],
+    monkeypatch: pytest.MonkeyPatch,
+):
+    data, config = make_world(0), replace(student, steps=90)
+    whole = distill_generator(data, data, config, tmp_path / "whole", joint_limits, *trained, progress=False)
+    plain_loss = DistillationTask.loss
+
+    def dies(self, step: int, rng: np.random.Generator):
+        if step == 77:
+            raise KeyboardInterrupt
+        return plain_loss(self, step, rng)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(DistillationTask, "loss", dies)
+        with pytest.raises(KeyboardInterrupt):
+            distill_generator(data, data, config, tmp_path / "cut", joint_limits, *trained, progress=False)
+    torch.manual_seed(12345)
+    resumed = distill_generator(data, data, config, tmp_path / "cut", joint_limits, *trained, progress=False)
+    assert all(torch.equal(whole.state_dict()[name], tensor) for name, tensor in resumed.state_dict().items())
+
+
+def test_a_teacher_must_pass_the_times_of_its_student(
+    tmp_path: Path,
+    make_world: MakeWorld,
+    student: TrainingConfig,
+    joint_limits: Limits,
+    trained: tuple[FlowGenerator, FFHEvaluator],
+):
+    odd = replace(student, model=replace(student.model, flow_steps=3))
+    with pytest.raises(OptionError, match="8 steps cannot teach 3"):
+        distill_generator(make_world(0), None, odd, tmp_path, joint_limits, *trained, progress=False)
