@@ -115,7 +115,7 @@ ROWS = (
         data=proposed_by("heuristic", "power", "perturb"),
     ),
     Row("half of the objects", "evaluator", data=half_of_the_objects),
-    Row("the teacher", "generator"),
+    Row("as shipped", "generator"),
     Row("the paper's cVAE", "generator", model(generator="cvae")),
     Row("raw BPS instead of its projection", "generator", model(pca_components=None)),
     Row("without the height of the table", "generator", model(use_table_height=False)),
@@ -184,8 +184,7 @@ def main(options: Options) -> None:
 
 def train(row: Row, data: TrainingData, folder: Path, steps: int) -> None:
     """Both networks into a folder, of which only the row's has learned anything."""
-    preset = TrainingConfig.default("evaluator" if row.network == "evaluator" else "teacher")
-    config = row.config(dataclasses.replace(preset, steps=steps))
+    config = row.config(dataclasses.replace(TrainingConfig.default(row.network), steps=steps))
     hand = load_hand(data.hand)
     limits = (hand.lower.tolist(), hand.upper.tolist())
     points = surface_points(hand, config.model.palm_points) if config.model.palm_points else None

@@ -135,11 +135,10 @@ def main(options: Options) -> None:
 
 def measure(name: Network, data: TrainingData, steps: int) -> dict[str, float]:
     """Medians over the steps of both loops."""
-    joints = len(data.joint_names)
-    if name == "cvae":
-        config = TrainingConfig.cvae(joints)
-    else:
-        config = TrainingConfig.default("evaluator" if name == "evaluator" else "teacher", joints)
+    network = "evaluator" if name == "evaluator" else "generator"
+    config = TrainingConfig.default(network, len(data.joint_names))
+    if name != "evaluator":
+        config = dataclasses.replace(config, model=dataclasses.replace(config.model, generator=name))
     points = surface_points(load_hand(data.hand), config.model.palm_points)
     raw = dataclasses.replace(config, model=dataclasses.replace(config.model, pca_components=None))
     loops = {

@@ -17,7 +17,7 @@ from typing import Annotated, Any, Union, cast
 
 import tyro
 
-from ffhnet.apps import benchmark, calibrate, data, evaluate, generate, grasp, hand, objects, train
+from ffhnet.apps import benchmark, calibrate, data, distil, evaluate, generate, grasp, hand, objects, train
 from ffhnet.errors import FFHNetError
 
 
@@ -37,6 +37,7 @@ COMMANDS = (
     Command("generate", generate.GenerateOptions, generate.run),
     Command("data", data.DataOptions, data.run),
     Command("train", train.TrainOptions, train.run),
+    Command("distil", distil.DistilOptions, distil.run),
     Command("calibrate", calibrate.CalibrateOptions, calibrate.run),
     Command("evaluate", evaluate.EvaluateOptions, evaluate.run),
     Command("benchmark", benchmark.BenchmarkOptions, benchmark.run),

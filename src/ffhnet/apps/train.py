@@ -34,9 +34,9 @@ class TrainOptions:
     preset: Literal["default", "paper"] = "default"
     """The project's own architecture and recipe, or the paper's (section III-D; hours on a CPU)."""
     generator: Annotated[Literal["flow", "cvae"] | None, absent("flow|cvae", "the preset's")] = None
-    """Flow matching, distilled to few steps, or the paper's conditional variational autoencoder."""
+    """Flow matching, or the paper's conditional variational autoencoder."""
     networks: Literal["both", "generator", "evaluator"] = "both"
-    """Which of them to train; the evaluator comes first, since it guides the flow."""
+    """Which of them to train."""
     steps: Annotated[int | None, absent("N", "the preset's")] = None
     """Optimiser steps of each network."""
     seed: int = 0
@@ -67,12 +67,7 @@ def _config(options: TrainOptions, network: Network) -> TrainingConfig:
 
     from ffhnet.training.config import TrainingConfig
 
-    if options.preset == "paper":
-        config = TrainingConfig.paper()
-    elif options.generator == "cvae" and network == "generator":
-        config = TrainingConfig.cvae()
-    else:
-        config = TrainingConfig.default(network)
+    config = TrainingConfig.paper() if options.preset == "paper" else TrainingConfig.default(network)
     model = dataclasses.replace(config.model, generator=options.generator or config.model.generator)
     return dataclasses.replace(config, model=model, steps=options.steps or config.steps, seed=options.seed)
 
@@ -83,38 +78,27 @@ def _train(options: TrainOptions, processes: Processes) -> None:
     from ffhnet.dataset.records import read_training_data
     from ffhnet.hands import load_hand
     from ffhnet.hands.surface_points import surface_points
-    from ffhnet.model.checkpoint import load_evaluator, read_info
-    from ffhnet.model.flow import FlowGenerator
-    from ffhnet.training import distill_generator, train_evaluator, train_generator
+    from ffhnet.model.checkpoint import read_info
+    from ffhnet.training import train_evaluator, train_generator
 
     if options.threads < 1 or (options.steps is not None and options.steps < 1):
         raise OptionError("--threads and --steps must be at least 1")
-    if options.preset == "paper" and options.generator == "flow":
-        raise OptionError("--preset paper has the paper's generator, got --generator flow")
     torch.set_num_threads(options.threads)
     data = read_training_data(list(options.data))
     val = None if options.val is None else read_training_data([options.val])
-    hand, out = load_hand(data.hand), options.out
+    hand = load_hand(data.hand)
     limits = (hand.lower.tolist(), hand.upper.tolist())
     generator, evaluator = _config(options, "generator"), _config(options, "evaluator")
     count = evaluator.model.palm_points
     points = surface_points(hand, count) if count else None
     if processes.first:
         print(f"{len(data.object_names)} objects, {data.num_views} views, {data.num_trials} trials")
-    judge = None
-    if options.networks != "generator":
-        judge = train_evaluator(data, val, evaluator, out, limits, points, processes=processes)
     if options.networks != "evaluator":
-        if generator.model.generator == "cvae":
-            train_generator(data, val, generator, out, limits, points, processes=processes)
-        else:
-            judge = judge or load_evaluator(out)
-            large = _config(options, "teacher")
-            teacher = train_generator(data, val, large, out / "teacher", limits, points, processes=processes)
-            assert isinstance(teacher, FlowGenerator)
-            distill_generator(data, val, generator, out, limits, teacher, judge, processes=processes)
+        train_generator(data, val, generator, options.out, limits, points, processes=processes)
+    if options.networks != "generator":
+        train_evaluator(data, val, evaluator, options.out, limits, points, processes=processes)
     if processes.first and val is not None:
-        summary = read_info(out).training
+        summary = read_info(options.out).training
         rows = [
             (network, name, f"{value:.4f}")
             for network, run_summary in summary.items()

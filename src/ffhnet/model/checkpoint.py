@@ -120,16 +120,10 @@ def load_checkpoint(folder: Path, hand: str | None = None, device: torch.device 
         raise WeightsError(f"wanted weights for hand {hand!r}, {folder} holds weights for {info.hand!r}")
     generator: Generator
     generator = FlowGenerator(info.model) if info.model.generator == "flow" else FFHGenerator(info.model)
-    _load_weights(folder, GENERATOR_FILE, digests, generator)
-    return Checkpoint(info, generator.to(device).eval(), load_evaluator(folder, device))
-
-
-def load_evaluator(folder: Path, device: torch.device | str = "cpu") -> FFHEvaluator:
-    """The evaluator of a folder that may have no generator yet. Raises WeightsError."""
-    info, digests = _read_config(folder)
     evaluator = FFHEvaluator(info.model)
+    _load_weights(folder, GENERATOR_FILE, digests, generator)
     _load_weights(folder, EVALUATOR_FILE, digests, evaluator)
-    return evaluator.to(device).eval()
+    return Checkpoint(info, generator.to(device).eval(), evaluator.to(device).eval())
 
 
 def read_info(folder: Path) -> CheckpointInfo:

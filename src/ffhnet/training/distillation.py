@@ -1,9 +1,10 @@
-"""A flow of few steps learns to end where a larger one ends, and then to please the evaluator.
+"""A flow of few steps learns to end where a larger one ends, and may then be guided by the evaluator.
 
-Two losses. The *student* starts from the same noise as its *teacher* and shall be where the teacher is at the
-student's times (progressive distillation, Salimans and Ho 2022, with the student's own states as inputs).
-Later the evaluator joins in: its gradient with respect to the grasp moves samples away from collisions and
-towards grasps that hold. The first loss keeps their variety.
+The *student* starts from the same noise as its *teacher* and shall be where the teacher is at the student's
+times (progressive distillation, Salimans and Ho 2022, with the student's own states as inputs). With guidance
+the evaluator joins in: its gradient with respect to the grasp moves samples away from collisions and towards
+grasps that hold, while the first loss keeps their variety. It also moves them to where the evaluator errs, so
+that what it says of the samples is worth less.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ class DistillationTask:
         distance = torch.stack(
             [functional.mse_loss(x, goal) for x, goal in zip(reached, wanted, strict=True)]
         ).mean()
-        if step < self.config.guidance_start * self.config.steps:
+        if self.config.guidance == 0 or step < self.config.guidance_start * self.config.steps:
             return distance, {"loss": distance.item(), "distance": distance.item()}
         blame = self._blame(objects, reached[-1])
         total = distance + self.config.guidance * blame

@@ -88,7 +88,7 @@ def distill_generator(
     progress: bool = True,
     processes: Processes = ALONE,
 ) -> FlowGenerator:
-    """Distil the flow of `config.model` from a larger one, guided by an evaluator (`distillation.py`).
+    """Distil the flow of `config.model` from a larger one (`distillation.py`), and write both networks.
 
     Args:
         data: views to learn on.
@@ -97,7 +97,7 @@ def distill_generator(
         out_dir: as for `train_generator`.
         joint_limits: lower and upper limits in radians.
         teacher: a trained flow, which gives projection, statistics and palm points; it is not changed.
-        evaluator: trained; it is not changed.
+        evaluator: trained; it guides, and is written beside the student unchanged.
         progress: show a progress bar.
         processes: as for `train_generator`.
     """
@@ -112,7 +112,7 @@ def distill_generator(
     metrics = fit(task, config, out_dir, "generator", progress, processes)
     if processes.first:
         info = _info(data, config, joint_limits, "generator", metrics)
-        save_checkpoint(out_dir, info, generator=module, half=True)
+        save_checkpoint(out_dir, info, generator=module, evaluator=evaluator, half=True)
     return module
 
 
