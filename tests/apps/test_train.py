@@ -1,0 +1,64 @@
+"""`ffhnet train` and `ffhnet distil`: from a data set to weights that `ffhnet grasp` takes."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+DATA = Path(__file__).parents[2] / "data" / "val0"
+FEW = ("--steps", 2, "--threads", 1, "--device", "cpu")
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    return tmp_path_factory.mktemp("trained") / "weights"
+
+
+def test_train_distil_and_grasp(ffhnet, trained, tmp_path, depth_png):
+    status, printed, err = ffhnet("train", DATA, "--val", DATA, "--out", trained, *FEW)
+    assert (status, err) == (0, "")
+    assert printed.startswith("24 objects, ")
+    assert "velocity_error" in printed
+    assert "auroc" in printed
+    # A finished run is not trained again.
+    before = (trained / "generator.safetensors").read_bytes()
+    assert ffhnet("train", DATA, "--out", trained, *FEW)[0] == 0
+    assert (trained / "generator.safetensors").read_bytes() == before
+
+    small = tmp_path / "small"
+    distil = ("distil", DATA, "--weights", trained, "--out", small, "--guidance", 0.5)
+    status, _, err = ffhnet(*distil, *FEW)
+    assert (status, err) == (0, "")
+    assert json.loads((small / "config.json").read_text())["model"]["flow_steps"] == 2
+    assert (small / "evaluator.safetensors").read_bytes() == (trained / "evaluator.safetensors").read_bytes()
+    assert (small / "generator.safetensors").stat().st_size < 0.7 * len(before)
+
+    for weights in (trained, small):
+        out = tmp_path / "grasps.json"
+        scene = ("grasp", depth_png, "--intrinsics", 600, 600, 320, 240, "--num", 5)
+        assert ffhnet(*scene, "--weights", weights, "--out", out)[0] == 0
+        assert len(json.loads(out.read_text())["grasps"]) == 5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("train", DATA, "--steps", 0), "--threads and --steps must be at least 1"),
+        (("train", "nowhere"), "nowhere"),
+        (("distil", DATA, "--weights", "nowhere"), "no weights in nowhere"),
+        (("distil", DATA, "--weights", "nowhere", "--guidance", -1), "--guidance at least 0"),
+    ],
+)
+def test_bad_input(ffhnet, tmp_path, arguments, message):
+    status, _, err = ffhnet(*arguments, "--out", tmp_path / "weights")
+    assert (status, err.count("\n")) == (2, 1)
+    assert message in err
+    assert not (tmp_path / "weights").exists()
+
+
+def test_a_cvae_cannot_be_distilled(ffhnet, tmp_path):
+    weights = tmp_path / "cvae"
+    assert ffhnet("train", DATA, "--generator", "cvae", "--out", weights, *FEW)[0] == 0
+    status, _, err = ffhnet("distil", DATA, "--weights", weights, "--out", tmp_path / "small", *FEW)
+    assert (status, err.count("\n")) == (2, 1)
+    assert "holds a cvae" in err
