@@ -13,7 +13,7 @@ from ffhnet.model.losses import JOINTS_WEIGHT, KL_WEIGHT
 Network = Literal["generator", "evaluator", "student"]
 """What is trained; the student is a flow that is distilled from a generator."""
 
-STEPS: dict[Network, int] = {"generator": 4000, "evaluator": 2200, "student": 3000}
+STEPS: dict[Network, int] = {"generator": 4000, "evaluator": 2800, "student": 3000}
 """Of the project's own preset."""
 
 
