@@ -1,5 +1,7 @@
 """A tracked grasp stays with a moving object; the best sample of every single view does not."""
 
+import itertools
+
 import numpy as np
 import pytest
 import torch
@@ -55,7 +57,7 @@ def jumps(chosen: list[Grasps], motion: list[tuple[Observation, np.ndarray]]) ->
             float(np.linalg.norm(b.position - a.position)) / NEAR_POSITION,
             float(geodesic_angle(a.rotation, b.rotation)[0]) / NEAR_ANGLE,
         )
-        for a, b in zip(on_object, on_object[1:], strict=False)
+        for a, b in itertools.pairwise(on_object)
     ]
     return np.array(moved)
 

@@ -25,9 +25,9 @@ class GraspTracker:
     """Chooses a grasp on every observation of an object that may move, and changes its mind reluctantly.
 
     The grasp chosen before is carried along with the mean of the visible points and rated again on what is
-    seen now. It stays as long as no sample is better by `margin`. When it goes, a near sample that is almost as
-    good as the best takes its place, so that the hand follows an object that turns; only where there is none
-    it jumps to the best.
+    seen now. It stays as long as no sample is better by `margin`. When it goes, a near sample that is almost
+    as good as the best takes its place, so that the hand follows an object that turns; only where there is
+    none it jumps to the best.
 
     Args:
         network: proposes and rates.
