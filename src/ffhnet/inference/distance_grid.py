@@ -69,8 +69,7 @@ class PalmReader:
         points = geometry.points
         self.count, self.width = len(points), geometry.width
         self._heights = geometry.width - 2 * len(points)
-        # One matrix product turns, moves and scales: [R | t] [p; 1].
-        self._points = torch.cat([points.T, torch.ones_like(points.T[:1])]) / CELL
+        self._points = (points.T / CELL).contiguous()
         parts = (1.0, self.count), (-NEAR / FAR, self.count), (CELL / FAR, self._heights)
         scale = torch.cat([points.new_full((count,), value) for value, count in parts])
         offset = torch.zeros_like(scale)
@@ -86,8 +85,9 @@ class PalmReader:
     ) -> None:
         """Fill `out` with the raw features of palms (position in m)."""
         num, count = len(rotation), self.count
-        pose = torch.cat([rotation, (position + MIDDLE * CELL).unsqueeze(-1)], dim=-1)
-        cells = (pose.transpose(0, 1).reshape(3 * num, 4) @ self._points).view(3, num, count)
+        origin = (position.T / CELL + MIDDLE).reshape(3 * num, 1)
+        cells = torch.addmm(origin, rotation.transpose(0, 1).reshape(3 * num, 3), self._points)
+        cells = cells.view(3, num, count)
         if self._heights:
             height = out[:, 2 * count :]
             torch.sub(cells[2, :, ::HEIGHT_EVERY], grid.table, out=height)
@@ -97,7 +97,7 @@ class PalmReader:
         node = within.floor()
         within.sub_(node)
         index = torch.add(node[1], node[0], alpha=GRID)
-        index = torch.add(node[2], index, alpha=GRID, out=index).long()
+        index = torch.add(node[2], index, alpha=GRID, out=index).int()
         terms = grid.coefficients.index_select(1, index)
         for axis, half in enumerate((4, 2, 1)):
             terms[:half].addcmul_(terms[half : 2 * half], within[axis])
