@@ -70,8 +70,8 @@ def scramble(network: nn.Module, seed: int) -> None:
             network.condition.projection.normal_(0, 5 * config.bps_size**-0.5, generator=g)
         if isinstance(network, FlowGenerator):
             network.mean.normal_(0, 0.2, generator=g)
-            network.mean[[0, 4]] += 1
-            network.deviation.uniform_(0.1, 0.4, generator=g)
+            network.mean[[0, 4]] += 2
+            network.deviation.uniform_(0.1, 0.3, generator=g)
         # As of trained networks, the two columns of a rotation are seldom so short that rounding turns it.
         if isinstance(network, FFHGenerator):
             network.rotation_head.bias[[0, 4]] += 3
