@@ -13,6 +13,7 @@ from jaxtyping import Float
 from ffhnet.errors import HandError, OptionError, WeightsError
 from ffhnet.geometry.transforms import invert
 from ffhnet.grasps import Grasps
+from ffhnet.inference.engine import Engine, SeenObject
 from ffhnet.inference.risk import RiskControl
 from ffhnet.inference.weights_calibration import WeightsCalibration, load_calibration
 from ffhnet.model.checkpoint import Checkpoint, CheckpointInfo, load_checkpoint
@@ -25,7 +26,10 @@ VIEW_FRAME = "view"
 
 
 class FFHNet:
-    """FFHGenerator and FFHEvaluator of one hand (figure 1)."""
+    """FFHGenerator and FFHEvaluator of one hand (figure 1).
+
+    `generator` and `evaluator` are the plain networks; grasps come from an `Engine` made of them.
+    """
 
     def __init__(
         self,
@@ -38,6 +42,7 @@ class FFHNet:
         self.device = torch.device(device)
         self.generator = checkpoint.generator.to(self.device)
         self.evaluator = checkpoint.evaluator.to(self.device)
+        self._engine = Engine(checkpoint)
         self._joint_lower = np.array(self.info.joint_lower)
         self._joint_upper = np.array(self.info.joint_upper)
 
@@ -81,8 +86,8 @@ class FFHNet:
         """
         if not 0 <= threshold <= 1:
             raise OptionError(f"the threshold is a probability between 0 and 1, got {threshold}")
-        in_view = self.generate(observation, num, torch.Generator().manual_seed(seed))
-        rated = self._rate(observation, in_view)
+        seen = self._look(observation)
+        rated = self._rate(seen, self._sample(seen, num, torch.Generator().manual_seed(seed)))
         assert rated.probability is not None
         ranked = rated[rated.probability >= threshold].ranked()
         return ranked.to_frame(observation.T_input_view, observation.frame)
@@ -95,18 +100,7 @@ class FFHNet:
             num: grasps to sample.
             generator: source of the latent samples z ~ N(0, I), on the CPU.
         """
-        if num < 1:
-            raise OptionError(f"the number of grasps must be at least 1, got {num}")
-        with torch.inference_mode():
-            raw = self.generator.sample(self._objects(observation), num, generator)
-        return Grasps(
-            rotation=raw.rotation[0].double().cpu().numpy(),
-            position=raw.position[0].double().cpu().numpy(),
-            joints=np.clip(raw.joints[0].double().cpu().numpy(), self._joint_lower, self._joint_upper),
-            joint_names=self.info.joint_names,
-            hand=self.info.hand,
-            frame=VIEW_FRAME,
-        )
+        return self._sample(self._look(observation), num, generator)
 
     def evaluate(self, observation: Observation, grasps: Grasps) -> Grasps:
         """The same grasps, in the same order, with `probability` and, if it is predicted, `robustness`.
@@ -123,7 +117,8 @@ class FFHNet:
             raise HandError(f"these networks rate grasps of {self.info.hand}, got {grasps.hand}'s joints")
         if grasps.frame != observation.frame:
             raise OptionError(f"wanted grasps in frame {observation.frame!r}, got {grasps.frame!r}")
-        rated = self._rate(observation, grasps.to_frame(invert(observation.T_input_view), VIEW_FRAME))
+        in_view = grasps.to_frame(invert(observation.T_input_view), VIEW_FRAME)
+        rated = self._rate(self._look(observation), in_view)
         return grasps.replace(probability=rated.probability, robustness=rated.robustness)
 
     def control_risk(self, max_failure: float, confidence: float = 0.95) -> RiskControl:
@@ -140,26 +135,39 @@ class FFHNet:
             raise WeightsError("a risk can only be chosen with calibrated weights: run `ffhnet calibrate`")
         return self.calibration.risk.control(max_failure, confidence)
 
-    def _rate(self, observation: Observation, in_view: Grasps) -> Grasps:
+    def _sample(self, seen: SeenObject, num: int, source: torch.Generator) -> Grasps:
+        if num < 1:
+            raise OptionError(f"the number of grasps must be at least 1, got {num}")
+        raw = seen.sample(num, source)
+        return Grasps(
+            rotation=raw.rotation[0].double().cpu().numpy(),
+            position=raw.position[0].double().cpu().numpy(),
+            joints=np.clip(raw.joints[0].double().cpu().numpy(), self._joint_lower, self._joint_upper),
+            joint_names=self.info.joint_names,
+            hand=self.info.hand,
+            frame=VIEW_FRAME,
+        )
+
+    def _rate(self, seen: SeenObject, in_view: Grasps) -> Grasps:
         def tensor(array: np.ndarray) -> torch.Tensor:
             return torch.as_tensor(array, dtype=torch.float32, device=self.device).unsqueeze(0)
 
-        grasps = GraspTensors(tensor(in_view.rotation), tensor(in_view.position), tensor(in_view.joints))
-        with torch.inference_mode():
-            logits = self.evaluator(self._objects(observation), grasps)
+        logits = seen.rate(
+            GraspTensors(tensor(in_view.rotation), tensor(in_view.position), tensor(in_view.joints))
+        )
         rated = in_view.replace(
             probability=_probability(logits.success),
             robustness=None if logits.robust is None else _probability(logits.robust),
         )
         return rated if self.calibration is None else self.calibration.apply(rated)
 
-    def _objects(self, observation: Observation) -> ObjectTensors:
+    def _look(self, observation: Observation) -> SeenObject:
         wanted = self.info.model.bps_size
         if np.shape(observation.bps) != (wanted,):
             raise OptionError(f"these networks take {wanted} BPS values, got {np.shape(observation.bps)}")
         bps = torch.as_tensor(observation.bps, dtype=torch.float32, device=self.device)
         height = torch.tensor([observation.table_height], dtype=torch.float32, device=self.device)
-        return ObjectTensors(bps.unsqueeze(0), height)
+        return self._engine.look(ObjectTensors(bps.unsqueeze(0), height))
 
 
 def _probability(logits: Float[torch.Tensor, "1 N"]) -> Float[np.ndarray, " N"]:
