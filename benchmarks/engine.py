@@ -4,9 +4,9 @@
 
 Published way: the architecture of section III at full size, with the raw basis point set vector copied for
 every grasp, in the plain modules. Its weights are random, which changes nothing about time. The runs of all
-ways alternate, and factors are medians of the factors within a round, so that what else the machine does slows
-all. Also shown: how time and memory grow with the number of grasps. The benchmark ends with an error if the
-engine's answers are not the plain modules'.
+ways alternate, and factors are medians of the factors within a round, so that what else the machine does
+slows all. Also shown: how time and memory grow with the number of grasps. The benchmark ends with an error
+if the engine's answers are not the plain modules'.
 """
 
 from __future__ import annotations
