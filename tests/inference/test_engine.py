@@ -104,7 +104,10 @@ def make_grasps(config: ModelConfig, num: int) -> GraspTensors:
     )
 
 
-def assert_same_answers(checkpoint: Checkpoint, objects: ObjectTensors, num: int) -> None:
+def assert_same_answers(
+    checkpoint: Checkpoint, objects: ObjectTensors, num: int, spread: float = 0.01
+) -> None:
+    """Equal poses and probabilities; `spread` is how much the latter must at least vary."""
     seen = Engine(checkpoint).look(objects)
     with torch.inference_mode():
         plain = checkpoint.generator.sample(objects, num, torch.Generator().manual_seed(3))
@@ -123,7 +126,7 @@ def assert_same_answers(checkpoint: Checkpoint, objects: ObjectTensors, num: int
         assert (value is None) is (wanted is None)
         if wanted is not None:
             torch.testing.assert_close(value.sigmoid(), wanted.sigmoid(), atol=1e-5, rtol=0)
-            assert wanted.sigmoid().std() > 0.01
+            assert wanted.sigmoid().std() > spread
 
 
 @pytest.mark.parametrize("name", CONFIGS)
@@ -135,7 +138,13 @@ def test_same_answers_as_the_plain_modules(name: str):
 
 def test_same_answers_with_the_packages_weights():
     checkpoint = load_checkpoint(shipped_weights())
-    assert_same_answers(checkpoint, make_objects(checkpoint.info.model), num=200)
+    angle, height = torch.linspace(-1.6, 1.6, 30), torch.linspace(-0.07, 0.07, 20)
+    x, y = -0.035 * angle.cos(), 0.035 * angle.sin()
+    cylinder = torch.stack([x.repeat(20), y.repeat(20), height.repeat_interleave(30)], dim=-1)
+    basis = torch.from_numpy(basis_points().copy()).float()
+    objects = ObjectTensors(torch.cdist(basis, cylinder).amin(dim=-1)[None], torch.tensor([-0.075]))
+    # How much trained networks tell these grasps apart is not this test's matter.
+    assert_same_answers(checkpoint, objects, num=200, spread=0)
 
 
 @pytest.mark.parametrize("name", FULL)
