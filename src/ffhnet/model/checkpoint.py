@@ -121,9 +121,10 @@ def load_checkpoint(folder: Path, hand: str | None = None, device: torch.device 
     generator: Generator
     generator = FlowGenerator(info.model) if info.model.generator == "flow" else FFHGenerator(info.model)
     evaluator = FFHEvaluator(info.model)
-    _load_weights(folder, GENERATOR_FILE, digests, generator)
-    _load_weights(folder, EVALUATOR_FILE, digests, evaluator)
-    return Checkpoint(info, generator.to(device).eval(), evaluator.to(device).eval())
+    for name, network in ((GENERATOR_FILE, generator), (EVALUATOR_FILE, evaluator)):
+        _load_weights(folder / name, digests.get(name), network)
+        network.to(device).eval()
+    return Checkpoint(info, generator, evaluator)
 
 
 def read_info(folder: Path) -> CheckpointInfo:
@@ -161,8 +162,7 @@ def _read_config(folder: Path) -> tuple[CheckpointInfo, dict[str, str]]:
         raise WeightsError(f"{path} is not a checkpoint description: {error}") from error
 
 
-def _load_weights(folder: Path, name: str, digests: dict[str, str], network: nn.Module) -> None:
-    path, digest = folder / name, digests.get(name)
+def _load_weights(path: Path, digest: str | None, network: nn.Module) -> None:
     if not path.is_file() or digest is None:
         raise WeightsError(f"{path.name} is missing in {path.parent}")
     data = path.read_bytes()

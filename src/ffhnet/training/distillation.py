@@ -88,9 +88,9 @@ class DistillationTask:
         self.module.eval()
         with torch.inference_mode(), seeded(self.config.seed) as rng:
             views = rng.choice(self._held_out.num_views, HELD_OUT_VIEWS)
-            noise = self._noise(HELD_OUT_VIEWS, HELD_OUT_GRASPS)
-            *_, last = self.module.path(self._objects(self._held_out, views), noise)
-            blame = self._blame(self._objects(self._held_out, views), last).item()
+            objects = self._objects(self._held_out, views)
+            *_, last = self.module.path(objects, self._noise(HELD_OUT_VIEWS, HELD_OUT_GRASPS))
+            blame = self._blame(objects, last).item()
         self.module.train()
         return {"blame": blame}
 
