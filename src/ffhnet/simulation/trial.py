@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from enum import IntEnum
 
@@ -107,8 +108,10 @@ class GraspTrial:
         steps: simulation steps made so far.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, watch: Callable[[], None] | None = None) -> None:
+        """Makes trials in a scene; `watch` is called after every simulated control period."""
         self._scene = scene
+        self._watch = watch
         self.hand = scene.hand
         self.steps = 0
         self._physics = scene.physics
@@ -292,6 +295,8 @@ class GraspTrial:
     def _advance(self) -> None:
         mujoco.mj_step(self._scene.model, self._scene.data, self._steps_per_period)
         self.steps += self._steps_per_period
+        if self._watch is not None:
+            self._watch()
 
     def _object_position(self) -> Float[np.ndarray, 3]:
         """Centre of mass of the object, world frame."""
