@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import torch
 import trimesh
 from jaxtyping import Float
 
@@ -29,21 +30,28 @@ def color_scale(values: Float[np.ndarray, " N"]) -> Float[np.ndarray, "N 3"]:
     return np.stack([np.interp(values, stops, channel) for channel in _SCALE.T], axis=-1)
 
 
+def link_colors(hand: Hand) -> Float[np.ndarray, "L 3"]:
+    """Colour of each link of a hand: palm, fingers or fingertips."""
+    tips = {site.body for site in hand.tree.sites}
+    return np.array(
+        [PALM if i == 0 else FINGERTIPS if i in tips else FINGERS for i in range(len(hand.tree.bodies))]
+    )
+
+
 def hand_surfaces(
     hand: Hand, joints: Float[np.ndarray, " J"], T_world_palm: Float[np.ndarray, "4 4"]
 ) -> list[Surface]:
     """Palm, fingers and fingertips of a hand in three colours, standing at a palm pose."""
-    mesh = hand.shape(joints)
-    # Hand.shape joins the geoms in order and each is connected, so component i is geom i.
-    geom_of_face = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(mesh.faces))
-    tips = {site.body for site in hand.tree.sites}
-    kind = np.array([0 if g.body == 0 else 2 if g.body in tips else 1 for g in hand.tree.geoms])
+    poses = T_world_palm @ hand.body_poses(torch.as_tensor(joints, dtype=torch.float64)[None])[0].numpy()
+    colors = link_colors(hand)
     surfaces = []
-    for index, color in enumerate((PALM, FINGERS, FINGERTIPS)):
-        faces = np.flatnonzero(kind[geom_of_face] == index)
-        if len(faces):
-            part = mesh.submesh([faces], append=True).smooth_shaded
-            surfaces.append(Surface(part.apply_transform(T_world_palm), color))
+    for color in (PALM, FINGERS, FINGERTIPS):
+        links = [i for i in np.flatnonzero((colors == color).all(axis=1)) if len(hand.body_shapes[i].faces)]
+        if links:
+            part = trimesh.util.concatenate(
+                [hand.body_shapes[i].copy().apply_transform(poses[i]) for i in links]
+            )
+            surfaces.append(Surface(part.smooth_shaded, color))
     return surfaces
 
 

@@ -113,15 +113,20 @@ class Hand:
         """The same grasps with the closing joints at their lower limits: the hand as it approaches."""
         return np.where(self.closing.moves > 0, self.lower, joints)
 
+    @cached_property
+    def body_shapes(self) -> tuple[trimesh.Trimesh, ...]:
+        """The collision shapes of every link in its own frame, one mesh each (empty where it has none)."""
+        parts: list[list[trimesh.Trimesh]] = [[] for _ in self.tree.bodies]
+        for geom in self.tree.geoms:
+            parts[geom.body].append(_primitive(geom.type, geom.size).apply_transform(geom.T_body_geom))
+        return tuple(trimesh.util.concatenate(part) if part else trimesh.Trimesh() for part in parts)
+
     def shape(self, joints: Float[np.ndarray, " J"]) -> trimesh.Trimesh:
         """One mesh of the hand's collision shapes in the palm frame, for pictures."""
         poses = self.body_poses(torch.as_tensor(joints, dtype=torch.float64)[None])[0].numpy()
-        parts = []
-        for geom in self.tree.geoms:
-            part = _primitive(geom.type, geom.size)
-            part.apply_transform(poses[geom.body] @ geom.T_body_geom)
-            parts.append(part)
-        return trimesh.util.concatenate(parts)
+        return trimesh.util.concatenate(
+            [mesh.copy().apply_transform(pose) for mesh, pose in zip(self.body_shapes, poses, strict=True)]
+        )
 
 
 def _primitive(kind: str, size: tuple[float, ...]) -> trimesh.Trimesh:
