@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -95,24 +96,33 @@ class KinematicTree:
                 (c * leader**power for power, c in enumerate(coupling.coefficients)),
                 start=torch.zeros_like(leader),
             )
+        still = torch.zeros_like(joints[:, 0])
+        angles = [still if body.joint is None else angle[body.joint.name] for body in self.bodies]
+        # All hinges at once: what costs time is the number of calls.
+        fixed, cross = (
+            torch.as_tensor(part, dtype=joints.dtype, device=joints.device) for part in self._constants
+        )
+        local = fixed @ _hinges(cross, torch.stack(angles, dim=1))
         poses: list[Tensor] = []
-        for body in self.bodies:
-            local = torch.as_tensor(body.T_parent_body, dtype=joints.dtype, device=joints.device)
-            local = local.expand(len(joints), 4, 4)
-            if body.joint is not None:
-                local = local @ _hinge(body.joint.axis, angle[body.joint.name])
-            poses.append(local if body.parent < 0 else poses[body.parent] @ local)
+        for i, body in enumerate(self.bodies):
+            poses.append(local[:, i] if body.parent < 0 else poses[body.parent] @ local[:, i])
         return torch.stack(poses, dim=1)
 
+    @cached_property
+    def _constants(self) -> tuple[Float[np.ndarray, "L 4 4"], Float[np.ndarray, "L 3 3"]]:
+        """T_parent_body, and the matrix of the cross product with the joint's axis; zero without a joint."""
+        axes = [np.zeros(3) if body.joint is None else body.joint.axis for body in self.bodies]
+        cross = np.cross(np.array(axes)[:, None], -np.eye(3))
+        return np.stack([body.T_parent_body for body in self.bodies]), cross
 
-def _hinge(axis: Float[np.ndarray, " 3"], angle: Float[Tensor, " B"]) -> Float[Tensor, "B 4 4"]:
-    """Rotation about a unit axis (Rodrigues) as a batch of transforms."""
-    x, y, z = axis
-    cross = torch.tensor([[0, -z, y], [z, 0, -x], [-y, x, 0]], dtype=angle.dtype, device=angle.device)
+
+def _hinges(cross: Float[Tensor, "L 3 3"], angle: Float[Tensor, "B L"]) -> Float[Tensor, "B L 4 4"]:
+    """Rotations about unit axes, given as cross products (Rodrigues), as transforms."""
+    s, c = torch.sin(angle)[..., None, None], torch.cos(angle)[..., None, None]
+    transform = torch.zeros(*angle.shape, 4, 4, dtype=angle.dtype, device=angle.device)
     eye = torch.eye(3, dtype=angle.dtype, device=angle.device)
-    s, c = torch.sin(angle)[:, None, None], torch.cos(angle)[:, None, None]
-    transform = torch.eye(4, dtype=angle.dtype, device=angle.device).repeat(len(angle), 1, 1)
-    transform[:, :3, :3] = eye + s * cross + (1 - c) * (cross @ cross)
+    transform[..., :3, :3] = eye + s * cross + (1 - c) * (cross @ cross)
+    transform[..., 3, 3] = 1
     return transform
 
 

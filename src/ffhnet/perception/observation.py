@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -40,6 +40,8 @@ class Observation:
         table_height: z of the table in the view frame in metres, a negative number.
         bps: basis point set encoding of the cloud in the view frame.
         plane: the table in the input frame, or None where it was not seen.
+        scene: all that was observed (m) in the input frame, the object included, and only the object where
+            it was cut out.
     """
 
     cloud: Float[np.ndarray, "N 3"]
@@ -48,6 +50,7 @@ class Observation:
     table_height: float
     bps: Float[np.ndarray, " 4096"]
     plane: Plane | None = None
+    scene: Float[np.ndarray, "S 3"] = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
     def up(self) -> Float[np.ndarray, " 3"]:
@@ -94,7 +97,7 @@ def observe_object(
         table_height = lowest - _CUT_BOTTOM
     if not table_height < 0:
         raise OptionError(f"the table must be below the cloud's mean (negative metres), got {table_height}")
-    return _observation(cloud, frame, T_input_view, table_height, None)
+    return _observation(cloud, frame, T_input_view, table_height, None, cloud)
 
 
 def observe_scene(
@@ -155,7 +158,7 @@ def _observe_scene(
             raise SceneError(f"wanted {MIN_POINTS} points of the mask above the table, got {len(members)}")
     T_input_view = view_frame(members, plane.normal, members.mean(axis=0))
     table_height = -float(plane.height(T_input_view[:3, 3]))
-    return _observation(members, "camera", T_input_view, table_height, plane)
+    return _observation(members, "camera", T_input_view, table_height, plane, cloud)
 
 
 def observe_depth(
@@ -183,9 +186,10 @@ def _observation(
     T_input_view: Float[np.ndarray, "4 4"],
     table_height: float,
     plane: Plane | None,
+    scene: Float[np.ndarray, "S 3"],
 ) -> Observation:
     bps = encode(apply(invert(T_input_view), cloud))
-    return Observation(cloud, frame, T_input_view, table_height, bps, plane)
+    return Observation(cloud, frame, T_input_view, table_height, bps, plane, scene)
 
 
 def _guess_viewing_direction(cloud: Float[np.ndarray, "N 3"], frame: str) -> Float[np.ndarray, " 3"]:
