@@ -26,7 +26,7 @@ from ffhnet.grasps import Grasps
 from ffhnet.hands import load_hand
 from ffhnet.metrics import wilson_interval
 from ffhnet.objects.grasp_object import GraspObject
-from ffhnet.objects.procedural import make_object, procedural_split
+from ffhnet.objects.procedural import make_object, split_seeds
 from ffhnet.sampling.heuristic import PAPER, POWER, sample_heuristic
 from ffhnet.simulation.panda.reach import PandaReach, Reach
 from ffhnet.simulation.panda.scene import LIFT_DURATION, build_arm_scene
@@ -79,7 +79,7 @@ class ObjectFigures:
 def main(options: Options) -> None:
     hand = load_hand()
     parts = []
-    for seed in track(procedural_split("test", options.objects), description="objects"):
+    for seed in track(split_seeds("procedural-test", options.objects), description="objects"):
         rng = np.random.default_rng([options.seed, seed])
         obj = make_object(seed)
         drawn = draw(obj, options.draws, rng)

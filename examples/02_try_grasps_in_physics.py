@@ -7,7 +7,7 @@ import numpy as np
 
 from ffhnet.hands import load_hand
 from ffhnet.inference import FFHNet
-from ffhnet.objects.procedural import make_object, procedural_split
+from ffhnet.objects.procedural import make_object, split_seeds
 from ffhnet.simulation.scene import build_scene
 from ffhnet.simulation.trial import GraspTrial, Outcome
 from ffhnet.simulation.views import ViewMaker
@@ -15,7 +15,7 @@ from ffhnet.simulation.views import ViewMaker
 
 def main() -> None:
     network = FFHNet.from_pretrained()
-    seed = procedural_split("test", 10)[5]
+    seed = split_seeds("procedural-test", 10)[5]
     obj = make_object(seed)
     T_world_object = obj.resting_poses[0]
 

@@ -10,12 +10,11 @@ from scipy.sparse.csgraph import connected_components
 from ffhnet.errors import ObjectError
 from ffhnet.objects.grasp_object import DENSITY, MASS_RANGE
 from ffhnet.objects.procedural import (
-    FAMILIES,
+    PROCEDURAL,
     make_object,
     object_name,
-    object_names,
-    procedural_split,
     seed_of,
+    split_seeds,
 )
 
 KIT_TEST_SIZES_MM = {
@@ -56,9 +55,9 @@ def gap(a: trimesh.Trimesh, b: trimesh.Trimesh) -> float:
 
 def test_every_family_is_reached_about_as_often_as_its_weight_says(objects):
     families = [obj.family for obj in objects]
-    total = sum(family.weight for family in FAMILIES.values())
-    assert len(FAMILIES) >= 10
-    for name, family in FAMILIES.items():
+    total = sum(family.weight for family in PROCEDURAL.values())
+    assert len(PROCEDURAL) >= 10
+    for name, family in PROCEDURAL.items():
         expected = len(objects) * family.weight / total
         assert abs(families.count(name) - expected) < 4 * np.sqrt(expected) + 1, name
 
@@ -148,7 +147,6 @@ def test_names_lead_back_to_seeds(objects):
     for seed, obj in enumerate(objects):
         assert obj.name == object_name(seed)
         assert seed_of(obj.name) == seed
-    assert object_names("test", 2) == [object_name(2_000_000), object_name(2_000_001)]
 
 
 @pytest.mark.parametrize("name", ["", "bottle", "bottle_", "bottle_x1", "mug_000000", "bottle_-00001"])
@@ -158,16 +156,23 @@ def test_unknown_names_are_refused(name):
 
 
 def test_splits_are_disjoint_and_prefixes_of_each_other():
-    train, val, test = (procedural_split(split, 5000) for split in ("train", "val", "test"))
-    assert (train[0], val[0], test[0]) == (0, 1_000_000, 2_000_000)
-    assert len(set(train) | set(val) | set(test)) == 15_000
-    assert procedural_split("val", 10) == val[:10]
+    splits = [
+        split_seeds(f"{collection}-{split}", 5000)
+        for collection in ("procedural", "varied")
+        for split in ("train", "val", "test")
+    ]
+    assert [seeds[0] for seeds in splits] == [million * 1_000_000 for million in range(6)]
+    assert len(set().union(*splits)) == 30_000
+    assert split_seeds("procedural-val", 10) == splits[1][:10]
 
 
-@pytest.mark.parametrize(("split", "count"), [("tests", 3), ("train", 0), ("val", 1_000_001)])
+@pytest.mark.parametrize(
+    ("split", "count"),
+    [("procedural-tests", 3), ("train", 3), ("procedural-train", 0), ("varied-val", 1_000_001)],
+)
 def test_bad_splits_are_refused(split, count):
     with pytest.raises(ObjectError, match="wanted"):
-        procedural_split(split, count)
+        split_seeds(split, count)
 
 
 def test_negative_seeds_are_refused():

@@ -23,6 +23,7 @@ def drawn():
     return {
         split: [make_object(first + int(offset)) for offset in rng.choice(SPLIT_SIZE, 40, replace=False)]
         for split, first in FIRST_SEED.items()
+        if split.startswith("procedural")
     }
 
 

@@ -31,7 +31,7 @@ class GenerateOptions:
     out: Annotated[Path, tyro.conf.Positional]
     """Folder of the data set."""
     objects: Annotated[str | None, absent("SPEC")] = None
-    """A folder of meshes, a mesh file, procedural-train:N, or the name of one object."""
+    """A folder of meshes, a mesh file, varied-train:N, or the name of one object."""
     split: Annotated[Literal["train", "val", "test"] | None, absent("{train,val,test}", "train")] = None
     """Split of procedural objects, without --objects."""
     count: Annotated[int | None, absent("N", f"{DEFAULT_COUNT} of a split, all of --objects")] = None

@@ -99,7 +99,9 @@ def split_of(object_name: str) -> str:
         seed = seed_of(object_name)
     except ObjectError:
         return "scans"
-    inside = (name for name, first in FIRST_SEED.items() if first <= seed < first + SPLIT_SIZE)
+    inside = (
+        name.rpartition("-")[2] for name, first in FIRST_SEED.items() if first <= seed < first + SPLIT_SIZE
+    )
     return next(inside, "scans")
 
 

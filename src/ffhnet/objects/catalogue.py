@@ -6,12 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import cast
 
 from ffhnet.errors import ObjectError
 from ffhnet.objects.grasp_object import GraspObject
 from ffhnet.objects.layouts import find_meshes
-from ffhnet.objects.procedural import FIRST_SEED, Split, make_object, object_name, procedural_split, seed_of
+from ffhnet.objects.procedural import FIRST_SEED, make_object, object_name, seed_of, split_seeds
 from ffhnet.objects.scans import load_scan
 
 DEFAULT_COUNT = 100
@@ -35,15 +34,15 @@ def resolve_objects(spec: str, cache_dir: str | Path | None = None) -> list[Obje
     """Objects that a specification names.
 
     Args:
-        spec: "procedural-test" or another split, "procedural-test:20" for its first 20 objects, the name of
-            one procedural object ("bottle_000123"), a mesh file, or a folder of meshes.
+        spec: "procedural-test", "varied-train" or another split, "procedural-test:20" for its first 20
+            objects, the name of one procedural object ("bottle_000123"), a mesh file, or a folder of meshes.
         cache_dir: where convex pieces of scans are kept, the user's cache folder if none.
 
     Raises:
         ObjectError: the specification names nothing.
         InputFileError: a folder without meshes.
     """
-    if spec.startswith("procedural-"):
+    if spec.partition(":")[0] in FIRST_SEED:
         return [_procedural(seed) for seed in _split_seeds(spec)]
     path = Path(spec)
     # The path of an empty text is the working folder.
@@ -54,17 +53,17 @@ def resolve_objects(spec: str, cache_dir: str | Path | None = None) -> list[Obje
     try:
         return [_procedural(seed_of(spec))]
     except ObjectError:
-        splits = ", ".join(f"procedural-{split}[:COUNT]" for split in FIRST_SEED)
+        splits = ", ".join(f"{split}[:COUNT]" for split in FIRST_SEED)
         raise ObjectError(
             f"wanted {splits}, a name such as {object_name(123)}, a mesh file or a folder, got {spec!r}"
         ) from None
 
 
 def _split_seeds(spec: str) -> list[int]:
-    split, colon, count = spec.removeprefix("procedural-").partition(":")
+    split, colon, count = spec.partition(":")
     if colon and not (count.isascii() and count.isdigit()):
         raise ObjectError(f"wanted a number of objects after the colon, got {spec!r}")
-    return procedural_split(cast(Split, split), int(count) if colon else DEFAULT_COUNT)
+    return split_seeds(split, int(count) if colon else DEFAULT_COUNT)
 
 
 def _procedural(seed: int) -> ObjectSource:

@@ -96,6 +96,39 @@ def extrude_xz(outline: Sequence[tuple[float, float]], half_width: float) -> tri
     return convex_hull(np.vstack([np.insert(flat, 1, side, axis=1) for side in (-half_width, half_width)]))
 
 
+def bar(
+    start: Float[np.ndarray, 3],
+    end: Float[np.ndarray, 3],
+    half: tuple[float, float],
+    taper: float = 1.0,
+) -> trimesh.Trimesh:
+    """Straight bar of oval section between two points.
+
+    Args:
+        start: metres.
+        end: metres.
+        half: half axes of the section at the start, metres: the horizontal one, and the other.
+        taper: size of the section at the end against that at the start.
+    """
+    along = (end - start) / np.linalg.norm(end - start)
+    across = np.cross((0.0, 0.0, 1.0), along)
+    # An upright bar has no horizontal side of its own.
+    across = across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-6 else np.array([0.0, 1.0, 0.0])
+    section = circle(1.0)[::2] * half @ np.stack([across, np.cross(along, across)])
+    return convex_hull(np.vstack([start + section, end + taper * section]))
+
+
+def ellipsoid(centre: Float[np.ndarray, 3], half: Float[np.ndarray, 3]) -> trimesh.Trimesh:
+    """Ellipsoid of half axes (x, y, z), metres, with flat patches of about a tenth of its size."""
+    return convex_hull(centre + half * trimesh.creation.icosphere(subdivisions=2).vertices)
+
+
+def block(centre: Float[np.ndarray, 3], half: Float[np.ndarray, 3]) -> trimesh.Trimesh:
+    """Box of half sides (x, y, z), metres."""
+    corners = np.stack(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0]), axis=-1).reshape(-1, 3)
+    return convex_hull(centre + half * corners)
+
+
 def hollow_wall(
     outer: Sequence[tuple[float, float]], inner_bottom: float, inner_top: float
 ) -> list[trimesh.Trimesh]:

@@ -1,27 +1,34 @@
-"""Procedural household objects: a seed gives an object, and disjoint ranges of seeds give the splits."""
+"""Procedural objects: a seed gives an object, and disjoint ranges of seeds give collections and splits."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import trimesh
 
 from ffhnet.errors import ObjectError
-from ffhnet.objects import packages, vessels
+from ffhnet.objects import packages, tableware, tools, toys, vessels
 from ffhnet.objects.grasp_object import GraspObject
 from ffhnet.objects.inertia import default_mass, piece_properties
 from ffhnet.objects.resting import resting_poses
 
 Split = Literal["train", "val", "test"]
 
+Collection = Literal["procedural", "varied"]
+"""Packages and vessels that stand, as in a cupboard; and everything else: tableware, tools and toys."""
+
 SPLIT_SIZE = 1_000_000
 """Seeds per split, so that the splits never meet."""
 
-FIRST_SEED: dict[Split, int] = {"train": 0, "val": SPLIT_SIZE, "test": 2 * SPLIT_SIZE}
-"""First seed of each split."""
+FIRST_SEED: dict[str, int] = {
+    f"{collection}-{split}": (3 * i + k) * SPLIT_SIZE
+    for i, collection in enumerate(get_args(Collection))
+    for k, split in enumerate(get_args(Split))
+}
+"""First seed of each split: "procedural-train", "procedural-val", …, "varied-test"."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +44,7 @@ class Family:
     weight: float
 
 
-FAMILIES: dict[str, Family] = {
+PROCEDURAL: dict[str, Family] = {
     "box": Family(packages.box, 12),
     "thin_box": Family(packages.thin_box, 12),
     "milk_carton": Family(packages.milk_carton, 4),
@@ -58,6 +65,37 @@ FAMILIES: dict[str, Family] = {
 }
 """Boxes and cylinders lead, as they do in a kitchen cupboard and in the KIT and BigBIRD object sets."""
 
+VARIED: dict[str, Family] = {
+    "plate": Family(tableware.plate, 4),
+    "wide_bowl": Family(tableware.wide_bowl, 7),
+    "pan": Family(tableware.pan, 5),
+    "pitcher": Family(tableware.pitcher, 8),
+    "teapot": Family(tableware.teapot, 6),
+    "stemmed_glass": Family(tableware.stemmed_glass, 4),
+    "hammer": Family(tools.hammer, 5),
+    "screwdriver": Family(tools.screwdriver, 5),
+    "wrench": Family(tools.wrench, 4),
+    "pliers": Family(tools.pliers, 4),
+    "ladle": Family(tools.ladle, 4),
+    "power_tool": Family(tools.power_tool, 6),
+    "torch": Family(tools.torch, 4),
+    "device": Family(tools.device, 5),
+    "stapler": Family(tools.stapler, 3),
+    "shoe": Family(tools.shoe, 8),
+    "quadruped": Family(toys.quadruped, 5),
+    "bird": Family(toys.bird, 6),
+    "aircraft": Family(toys.aircraft, 6),
+    "vehicle": Family(toys.vehicle, 6),
+    "ring": Family(toys.ring, 5),
+    "basket": Family(toys.basket, 4),
+    "composite": Family(toys.composite, 14),
+}
+"""Wide, flat, long, lying and branching things, of which the other collection has few. The hand cannot grasp
+some of them (`graspability.why_not_graspable`), as in any set of real objects."""
+
+FAMILIES = PROCEDURAL | VARIED
+"""All families by name."""
+
 
 def make_object(seed: int) -> GraspObject:
     """Procedural object of a seed; the same seed always gives the same object.
@@ -66,7 +104,7 @@ def make_object(seed: int) -> GraspObject:
         ObjectError: the seed is negative.
     """
     rng = _generator(seed)
-    family = _draw_family(rng)
+    family = _draw_family(seed, rng)
     pieces = _grounded(FAMILIES[family].draw(rng))
     poses = resting_poses(pieces)
     return GraspObject(
@@ -86,7 +124,7 @@ def object_name(seed: int) -> str:
     Raises:
         ObjectError: the seed is negative.
     """
-    return f"{_draw_family(_generator(seed))}_{seed:06d}"
+    return f"{_draw_family(seed, _generator(seed))}_{seed:06d}"
 
 
 def seed_of(name: str) -> int:
@@ -101,8 +139,8 @@ def seed_of(name: str) -> int:
     return int(digits)
 
 
-def procedural_split(split: Split, count: int) -> list[int]:
-    """Seeds of the first `count` objects of a split; splits share no seed.
+def split_seeds(split: str, count: int) -> list[int]:
+    """Seeds of the first `count` objects of a split such as "procedural-test"; splits share no seed.
 
     Raises:
         ObjectError: an unknown split, or more objects than a split holds.
@@ -114,24 +152,16 @@ def procedural_split(split: Split, count: int) -> list[int]:
     return list(range(FIRST_SEED[split], FIRST_SEED[split] + count))
 
 
-def object_names(split: Split, count: int) -> list[str]:
-    """Names of the first `count` objects of a split.
-
-    Raises:
-        ObjectError: an unknown split, or more objects than a split holds.
-    """
-    return [object_name(seed) for seed in procedural_split(split, count)]
-
-
 def _generator(seed: int) -> np.random.Generator:
     if seed < 0:
         raise ObjectError(f"wanted a seed of 0 or more, got {seed}")
     return np.random.default_rng(seed)
 
 
-def _draw_family(rng: np.random.Generator) -> str:
-    weights = np.array([family.weight for family in FAMILIES.values()])
-    return str(rng.choice(list(FAMILIES), p=weights / weights.sum()))
+def _draw_family(seed: int, rng: np.random.Generator) -> str:
+    families = PROCEDURAL if seed < FIRST_SEED["varied-train"] else VARIED
+    weights = np.array([family.weight for family in families.values()])
+    return str(rng.choice(list(families), p=weights / weights.sum()))
 
 
 def _grounded(pieces: list[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
