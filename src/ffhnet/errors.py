@@ -42,3 +42,7 @@ class OptionError(FFHNetError):
 
 class MissingExtraError(FFHNetError):
     """An optional dependency is needed; the message names the extra to install."""
+
+
+class MessageError(FFHNetError):
+    """A message of another program contradicts itself, or is of a kind that cannot be read."""

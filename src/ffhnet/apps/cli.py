@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
 import os
 import re
 import sys
@@ -18,6 +19,7 @@ from typing import Annotated, Any, Union, cast
 import tyro
 
 from ffhnet.apps import benchmark, calibrate, data, distil, evaluate, generate, grasp, hand, objects, train
+from ffhnet.apps.ros2 import command as ros2
 from ffhnet.errors import FFHNetError
 
 
@@ -41,6 +43,7 @@ COMMANDS = (
     Command("calibrate", calibrate.CalibrateOptions, calibrate.run),
     Command("evaluate", evaluate.EvaluateOptions, evaluate.run),
     Command("benchmark", benchmark.BenchmarkOptions, benchmark.run),
+    Command("ros", ros2.RosOptions, ros2.run),
 )
 
 ERROR_STATUS = 2
@@ -73,6 +76,9 @@ def _parse(arguments: Sequence[str]) -> Any:
         ]
         for c in COMMANDS
     )
+    if arguments[:1] == ["ros"]:
+        # What follows is for ROS, which reads the command line itself.
+        arguments = list(itertools.takewhile(lambda argument: argument != "--ros-args", arguments))
     messages = io.StringIO()
     try:
         with contextlib.redirect_stderr(messages):
