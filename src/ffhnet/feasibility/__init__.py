@@ -1,0 +1,1 @@
+"""Which grasps can be done: the hand and the arm against the table and all that the camera saw."""
