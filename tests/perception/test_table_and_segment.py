@@ -102,6 +102,70 @@ def test_objects_are_taken_apart_and_the_middle_one_comes_first():
     assert {tuple(np.sign(mean[:2])) for mean in means[1:]} == {(1.0, 1.0), (-1.0, -1.0)}
 
 
+def mug_with_handle():
+    """A tall cup and a vertical bar beside it, 2 cm away and clear of the table: the gap is wider than any
+    that noise leaves, so that the bar is a cluster of its own."""
+    cup = trimesh.creation.cylinder(radius=0.035, height=0.12)
+    cup.apply_translation([0, 0, 0.06])
+    return [cup, slab((0.015, 0.03, 0.06), (0.0, -0.075, 0.07))]
+
+
+@pytest.mark.parametrize("tilt", [20, 40, 60])
+def test_a_part_that_hangs_in_the_air_belongs_to_what_is_beside_it(tilt):
+    for seed in range(3):
+        pose = camera_at(tilt, azimuth=0.0)
+        cloud = noisy_cloud(mug_with_handle(), pose, seed)
+        objects = segment_objects(cloud, true_plane(pose))
+        assert len(objects) == 1
+        world = apply(pose, cloud)
+        on_bar = np.flatnonzero((np.abs(world[:, 1] + 0.075) < 0.015) & (np.abs(world[:, 2] - 0.07) < 0.03))
+        assert np.isin(on_bar, objects[0]).mean() > 0.9
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_part_over_the_rest_is_joined_where_it_hides_the_neck(seed):
+    # From above, the head of a duck is an island: its neck is not seen.
+    head = slab((0.05, 0.05, 0.01), (0.0, 0.0, 0.12))
+    pose = camera_at(80)
+    objects = segment_objects(
+        noisy_cloud([box_on_table(sides=(0.1, 0.14, 0.06)), head], pose, seed), true_plane(pose)
+    )
+    assert len(objects) == 1
+
+
+def test_what_stands_alone_in_the_air_stays_alone():
+    pose = camera_at(40, azimuth=0.0)
+    far = slab((0.03, 0.03, 0.06), (0.0, -0.2, 0.07))
+    assert len(segment_objects(noisy_cloud([box_on_table(), far], pose), true_plane(pose))) == 2
+
+
+@pytest.mark.parametrize("gap", [0.04, 0.06])
+@pytest.mark.parametrize("tilt", [20, 35])
+def test_an_object_behind_another_keeps_to_itself_though_its_foot_is_hidden(gap, tilt):
+    pose = camera_at(tilt, azimuth=0.0)
+    front = box_on_table(0.05, sides=(0.06, 0.12, 0.08))
+    rear = box_on_table(0.02 - gap - 0.03, sides=(0.06, 0.08, 0.18))
+    for seed in range(3):
+        assert len(segment_objects(noisy_cloud([front, rear], pose, seed), true_plane(pose))) == 2
+
+
+def test_overhead_views_of_neighbours_are_not_joined():
+    for tilt in (75, 88):
+        pose = camera_at(tilt)
+        boxes = [box_on_table(x, sides=(0.06, 0.06, 0.12)) for x in (-0.045, 0.045)]
+        assert len(segment_objects(noisy_cloud(boxes, pose), true_plane(pose))) == 2
+
+
+def test_an_object_seen_against_nothing_is_not_cut_off():
+    # The tall box rises over the far edge of the table, where no camera reading is: the highest of the cloud.
+    pose = camera_at(16, distance=0.8)
+    tall, short = box_on_table(sides=(0.08, 0.1, 0.3)), box_on_table(0.0, 0.2, sides=(0.04, 0.04, 0.05))
+    cloud = noisy_cloud([tall, short], pose)
+    objects = segment_objects(cloud, true_plane(pose))
+    assert len(objects) == 2
+    assert np.abs(apply(pose, cloud[objects[0]]).mean(axis=0)[:2]).max() < 0.06
+
+
 def test_what_the_view_cuts_off_comes_last():
     pose = camera_at(45)
     cut_off = box_on_table(-0.13, 0.3, sides=(0.15, 0.15, 0.2))

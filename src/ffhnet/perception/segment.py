@@ -10,6 +10,7 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from ffhnet.errors import SceneError
 from ffhnet.perception.cloud import MIN_POINTS, search_tree
+from ffhnet.perception.hanging import join_hanging
 from ffhnet.perception.table import Plane
 
 MIN_HEIGHT = 0.005
@@ -82,22 +83,32 @@ def segment_objects(
         )
     labels = _clusters(cloud[seeds])
     low = standing[height[standing] <= seed_height]
+    parts = [
+        np.concatenate([members, foot])
+        for members, foot in _with_low_points(cloud, seeds, labels, low)
+        if len(members) >= MIN_POINTS
+    ]
+    part_of = join_hanging(parts, cloud, plane)
     found = []
-    for members, foot in _with_low_points(cloud, seeds, labels, low):
-        size = np.ptp(cloud[members], axis=0).max()
-        if len(members) >= MIN_POINTS and size < _MAX_SIZE:
-            found.append(np.sort(np.concatenate([members, foot])))
+    for owner in np.unique(part_of):
+        members = np.sort(np.concatenate([parts[i] for i in np.flatnonzero(part_of == owner)]))
+        if np.ptp(cloud[members], axis=0).max() < _MAX_SIZE:
+            found.append(members)
     if not found:
         raise SceneError(f"no object on the table: no cluster of {MIN_POINTS} points below {_MAX_SIZE} m")
-    view = _bearings(cloud[:: 1 + len(cloud) // _TABLE_SAMPLE])
-    low_edge, high_edge = view.min(axis=1) + _BORDER, view.max(axis=1) - _BORDER
+    return sorted(found, key=lambda members: (_is_cut_off(members, cloud), -_prominence(cloud[members])))
 
-    def rank(members: Int[np.ndarray, " M"]) -> tuple[bool, float]:
-        bearings = _bearings(cloud[members])
-        cut_off = bool(((bearings.min(axis=1) < low_edge) | (bearings.max(axis=1) > high_edge)).any())
-        return cut_off, -_prominence(cloud[members])
 
-    return sorted(found, key=rank)
+def _is_cut_off(members: Int[np.ndarray, " M"], cloud: Float[np.ndarray, "N 3"]) -> bool:
+    """Whether an object ends where the rest of the scene ends; beyond that it is seen against nothing."""
+    rest = np.ones(len(cloud), dtype=bool)
+    rest[members] = False
+    some = slice(None, None, 1 + len(cloud) // _TABLE_SAMPLE)
+    view = _bearings(cloud[some][rest[some]])
+    bearings = _bearings(cloud[members])
+    low = np.abs(bearings.min(axis=1) - view.min(axis=1)) < _BORDER
+    high = np.abs(bearings.max(axis=1) - view.max(axis=1)) < _BORDER
+    return bool((low | high).any())
 
 
 def _bearings(points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "2 N"]:
