@@ -35,7 +35,10 @@ class NearestGrid:
 
     @classmethod
     def of(cls, points: Float[np.ndarray, "N 3"], reach: float, cell: float) -> NearestGrid:
-        """The grid of points (m) that answers for places within `reach` (m) of one of them."""
+        """The grid of points (m) that answers for places within about `reach` (m) of one of them.
+
+        "About", because cells are near to each other by their middles: surely within two cells less.
+        """
         points = np.asarray(points, dtype=np.float32).reshape(-1, 3)
         if len(points) == 0:
             none = np.zeros(0, dtype=np.int32)

@@ -83,6 +83,11 @@ class Hand:
         """Upper joint limits, rad."""
         return np.array([self.tree.joints[name].upper for name in self.joint_names])
 
+    @cached_property
+    def torque_limit(self) -> Float[np.ndarray, " J"]:
+        """Largest torque of each joint's actuator, Nm; infinite where the MJCF gives none."""
+        return np.array([self.tree.torque_limits.get(name, np.inf) for name in self.joint_names])
+
     @property
     def num_joints(self) -> int:
         """Number of actuated joints."""

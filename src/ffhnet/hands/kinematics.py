@@ -73,12 +73,13 @@ class Coupling:
 
 @dataclass(frozen=True)
 class KinematicTree:
-    """Bodies in an order where parents come first, with shapes, sites and couplings."""
+    """Bodies in an order where parents come first, with shapes, sites, couplings and torque limits (Nm)."""
 
     bodies: tuple[Body, ...]
     geoms: tuple[Geom, ...]
     sites: tuple[Site, ...]
     couplings: tuple[Coupling, ...]
+    torque_limits: dict[str, float]
 
     @property
     def joints(self) -> dict[str, Joint]:
@@ -136,13 +137,22 @@ def read_mjcf(path: Path) -> KinematicTree:
     tops = [] if world is None else world.findall("body")
     if len(tops) != 1:
         raise HandError(f"{path.name} must hold exactly one root body, got {len(tops)}")
-    reader = _Reader(_Defaults(root.find("default")))
+    defaults = _Defaults(root.find("default"))
+    reader = _Reader(defaults)
     reader.add_body(tops[0], -1, None)
     couplings = tuple(
         Coupling(e.attrib["joint1"], e.attrib["joint2"], _floats(e.get("polycoef", "0 1 0 0 0")))
         for e in root.iterfind("equality/joint")
     )
-    return KinematicTree(tuple(reader.bodies), tuple(reader.geoms), tuple(reader.sites), couplings)
+    actuators = [(e.get("joint", ""), defaults.attributes(e, None)) for e in root.iterfind("actuator/*")]
+    torque_limits = {
+        joint: min(abs(force) for force in _floats(attributes["forcerange"]))
+        for joint, attributes in actuators
+        if "forcerange" in attributes
+    }
+    return KinematicTree(
+        tuple(reader.bodies), tuple(reader.geoms), tuple(reader.sites), couplings, torque_limits
+    )
 
 
 class _Defaults:

@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 from ffhnet.geometry.rotations import matrix_from_rotation_vector
 from ffhnet.geometry.transforms import invert, make_transform
 from ffhnet.grasps import Grasps
+from ffhnet.hands.closing import closing_advances
 from ffhnet.simulation.scene import HAND, OBJECT, TABLE, Scene
 
 SWEEP_PERIODS = 2
@@ -253,7 +254,7 @@ class GraspTrial:
         or at the end of their way if they never do.
         """
         closing, scene = self.hand.closing, self._scene
-        advances = self._advances(joints)
+        advances = closing_advances(self.hand, joints, self._physics.control_period)
         path = self.hand.open(joints) + np.concatenate(
             [np.zeros((1, len(joints))), np.cumsum(advances, axis=0)]
         )
@@ -270,18 +271,6 @@ class GraspTrial:
             self._advance()
         for _ in range(round(closing.squeeze / self._physics.control_period)):
             self._advance()
-
-    def _advances(self, joints: Float[np.ndarray, " J"]) -> Float[np.ndarray, "K J"]:
-        """How far the targets advance in each control period, rad, where nothing holds them up.
-
-        On the way to the grasp's joints all fingers arrive together; from there on they close at one speed.
-        """
-        closing = self.hand.closing
-        way = joints - self.hand.open(joints)
-        step = closing.speed * self._physics.control_period
-        arriving = max(round(way.max() / step), 1)
-        periods = np.arange(round(closing.duration / self._physics.control_period))[:, None]
-        return np.where(periods < arriving, way / arriving, step * closing.moves)
 
     def _last_free(self, path: Float[np.ndarray, "K J"]) -> int:
         """The place on the path from which the closing is simulated."""
