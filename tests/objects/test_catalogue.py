@@ -15,6 +15,14 @@ def test_a_split_names_its_first_objects():
     assert len(resolve_objects("procedural-val")) == DEFAULT_COUNT
 
 
+def test_several_specifications_are_taken_in_their_order(tmp_path):
+    trimesh.creation.box(extents=[0.04, 0.05, 0.06]).export(tmp_path / "a.obj")
+    sources = resolve_objects(f"varied-val:2, {tmp_path},procedural-val:1")
+    assert [source.name for source in sources] == [
+        object_name(4_000_000), object_name(4_000_001), "a", object_name(1_000_000)
+    ]  # fmt: skip
+
+
 def test_a_single_name_is_found():
     (source,) = resolve_objects(object_name(5))
     assert source.load().name == object_name(5)
@@ -37,7 +45,16 @@ def test_files_and_folders_are_found_and_not_read_before_load(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "spec", ["procedural-tests", "procedural-test:", "procedural-test:x", "procedural-test:0", "nowhere", ""]
+    "spec",
+    [
+        "procedural-tests",
+        "procedural-test:",
+        "procedural-test:x",
+        "procedural-test:0",
+        "nowhere",
+        "",
+        "procedural-val:1,",
+    ],
 )
 def test_specifications_that_name_nothing_are_refused(spec):
     with pytest.raises(ObjectError, match="wanted"):

@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 class CalibrateOptions:
     """Try the generator's own grasps on unseen objects, and write what was learned beside the weights.
 
-    The first objects fit the maps of the probabilities; the others, which the maps have not seen, are the
-    record from which `ffhnet grasp --max-failure` picks its threshold.
+    Random ones of the objects fit the maps of the probabilities; the others, which the maps have not seen, are
+    the record from which `ffhnet grasp --max-failure` picks its threshold.
     """
 
     weights: Annotated[Path, tyro.conf.Positional]
     """Folder of weights; gets calibration.json."""
-    objects: str = "procedural-val:384"
+    objects: str = "procedural-val:184,varied-val:100"
     """Objects that trained nothing."""
     first: int = 24
     """Leave out this many of them, which development looked at."""
-    fit: int = 60
+    fit: int = 100
     """How many of the others fit the maps."""
     views: int = 4
     """Views per object, its resting poses in turn."""
@@ -62,7 +62,8 @@ def run(options: CalibrateOptions) -> None:
 
     if min(options.views, options.samples, options.executed, options.workers) < 1 or options.first < 0:
         raise OptionError("--views, --samples, --executed, --workers must be at least 1, --first at least 0")
-    sources = resolve_objects(options.objects)[options.first :]
+    named = resolve_objects(options.objects)[options.first :]
+    sources = [named[i] for i in np.random.default_rng(options.seed).permutation(len(named))]
     if not 2 <= options.fit <= len(sources) - 2:
         raise OptionError(
             f"--fit must leave 2 of the {len(sources)} objects on either side, got {options.fit}"

@@ -35,16 +35,19 @@ def resolve_objects(spec: str, cache_dir: str | Path | None = None) -> list[Obje
 
     Args:
         spec: "procedural-test", "varied-train" or another split, "procedural-test:20" for its first 20
-            objects, the name of one procedural object ("bottle_000123"), a mesh file, or a folder of meshes.
+            objects, the name of one procedural object ("bottle_000123"), a mesh file, or a folder of meshes;
+            or several of these, separated by commas.
         cache_dir: where convex pieces of scans are kept, the user's cache folder if none.
 
     Raises:
         ObjectError: the specification names nothing.
         InputFileError: a folder without meshes.
     """
+    path = Path(spec)
+    if "," in spec and not path.exists():
+        return [source for part in spec.split(",") for source in resolve_objects(part.strip(), cache_dir)]
     if spec.partition(":")[0] in FIRST_SEED:
         return [_procedural(seed) for seed in _split_seeds(spec)]
-    path = Path(spec)
     # The path of an empty text is the working folder.
     if spec and path.is_dir():
         return [_scan(mesh.name, mesh.path, cache_dir) for mesh in find_meshes(path)]
