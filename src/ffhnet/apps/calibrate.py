@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 class CalibrateOptions:
     """Try the generator's own grasps on unseen objects, and write what was learned beside the weights.
 
-    Random ones of the objects fit the maps of the probabilities; the others, which the maps have not seen, are
+    Random ones of the objects fit the maps of the probabilities; the others, unseen by the maps, are
     the record from which `ffhnet grasp --max-failure` picks its threshold.
     """
 
