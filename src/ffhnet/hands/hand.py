@@ -6,11 +6,10 @@ import sys
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
-import trimesh
 from jaxtyping import Float
 from torch import Tensor
 
@@ -18,6 +17,9 @@ from ffhnet.errors import HandError
 from ffhnet.geometry.rotations import matrix_from_euler_xyz
 from ffhnet.geometry.transforms import invert, make_transform
 from ffhnet.hands.kinematics import KinematicTree, read_mjcf
+
+if TYPE_CHECKING:
+    import trimesh
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -121,29 +123,16 @@ class Hand:
     @cached_property
     def body_shapes(self) -> tuple[trimesh.Trimesh, ...]:
         """The collision shapes of every link in its own frame, one mesh each (empty where it has none)."""
-        parts: list[list[trimesh.Trimesh]] = [[] for _ in self.tree.bodies]
-        for geom in self.tree.geoms:
-            parts[geom.body].append(_primitive(geom.type, geom.size).apply_transform(geom.T_body_geom))
-        return tuple(trimesh.util.concatenate(part) if part else trimesh.Trimesh() for part in parts)
+        from ffhnet.hands.shapes import body_meshes  # here, because trimesh takes long to import
+
+        return body_meshes(self.tree)
 
     def shape(self, joints: Float[np.ndarray, " J"]) -> trimesh.Trimesh:
         """One mesh of the hand's collision shapes in the palm frame, for pictures."""
-        poses = self.body_poses(torch.as_tensor(joints, dtype=torch.float64)[None])[0].numpy()
-        return trimesh.util.concatenate(
-            [mesh.copy().apply_transform(pose) for mesh, pose in zip(self.body_shapes, poses, strict=True)]
-        )
+        from ffhnet.hands.shapes import placed  # likewise
 
-
-def _primitive(kind: str, size: tuple[float, ...]) -> trimesh.Trimesh:
-    """A mesh of MuJoCo's primitive, centred, long axis z."""
-    if kind == "box":
-        return trimesh.creation.box(2 * np.array(size))
-    if kind == "sphere":
-        return trimesh.creation.icosphere(radius=size[0])
-    if kind == "cylinder":
-        return trimesh.creation.cylinder(radius=size[0], height=2 * size[1])
-    capsule = trimesh.creation.capsule(radius=size[0], height=2 * size[1], count=[24, 24])
-    return capsule.apply_translation(-capsule.bounds.mean(axis=0))
+        poses = self.body_poses(torch.as_tensor(joints, dtype=torch.float64)[None])[0]
+        return placed(self.body_shapes, poses.numpy())
 
 
 @lru_cache

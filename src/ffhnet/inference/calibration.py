@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.optimize import minimize
 from scipy.special import expit
 
 from ffhnet.errors import OptionError, WeightsError
@@ -156,6 +155,8 @@ def _fit(kind: str, probability: np.ndarray, success: np.ndarray) -> Calibration
     # Bounds keep samples of one class only, which no finite map fits best, from leading to infinity.
     slopes = basis[:, 0] + basis[:, 1] > 0
     bounds = [(MIN_SLOPE, 100.0) if slope else (-20.0, 20.0) for slope in slopes]
+    from scipy.optimize import minimize  # here, because only fitting needs it
+
     solution = minimize(loss, slopes.astype(float), jac=True, method="L-BFGS-B", bounds=bounds)
     low, high, shift = solution.x @ basis
     return Calibration(float(low), float(high), float(shift))

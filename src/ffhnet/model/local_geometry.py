@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import torch
 from jaxtyping import Float, Int
@@ -45,8 +47,8 @@ class DistanceField(nn.Module):
 
     def __init__(self, bps_size: int):
         super().__init__()
-        index, weight = _plane_fit(basis_points(bps_size))
-        self.register_buffer("index", torch.from_numpy(index), persistent=False)
+        index, weight = _plane_fit(bps_size)
+        self.register_buffer("index", torch.tensor(index), persistent=False)
         self.register_buffer("weight", torch.from_numpy(weight).float(), persistent=False)
 
     def forward(self, bps: Float[Tensor, "V D"]) -> Float[Tensor, "V 1 N N N"]:
@@ -106,8 +108,10 @@ class LocalGeometry(nn.Module):
         return torch.cat(features, dim=-1)
 
 
-def _plane_fit(basis: Float[np.ndarray, "D 3"]) -> tuple[Int[np.ndarray, "M k"], Float[np.ndarray, "M k"]]:
+@lru_cache(maxsize=2)
+def _plane_fit(bps_size: int) -> tuple[Int[np.ndarray, "M k"], Float[np.ndarray, "M k"]]:
     """For each node of the grid, basis points and weights whose weighted sum is the fitted plane's value."""
+    basis = basis_points(bps_size)
     axis = np.linspace(-BASIS_RADIUS, BASIS_RADIUS, GRID)
     nodes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     distance, index = cKDTree(basis).query(nodes, k=min(NEIGHBOURS, len(basis)))

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 from jaxtyping import Float
 
 from ffhnet.errors import OptionError
 from ffhnet.geometry.transforms import apply, invert, make_transform
 from ffhnet.perception.raycast import RayScene
+
+if TYPE_CHECKING:
+    import trimesh
 
 TABLE_SIZE = 1.2
 """m: side of the square table around the world origin that `render_depth` shows."""
@@ -166,7 +170,7 @@ def _window(
     """Rows and columns of the image outside of which no ray can hit a mesh."""
     if scene.bounds is None:
         return slice(0, 0), slice(0, 0)
-    corners = trimesh.bounds.corners(scene.bounds)
+    corners = np.array(list(itertools.product(*scene.bounds.T)))
     in_camera = apply(invert(T_world_camera), corners)
     if in_camera[:, 2].min() < _NEAR:
         return slice(0, intrinsics.height), slice(0, intrinsics.width)

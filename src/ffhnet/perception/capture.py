@@ -7,10 +7,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
-import trimesh
 from jaxtyping import Float
 from PIL import Image
-from pypcd4 import PointCloud
 
 from ffhnet.errors import CloudError, InputFileError
 from ffhnet.perception.cloud import validate_cloud
@@ -126,6 +124,8 @@ def _read_ply(path: Path) -> np.ndarray:
         if file.read(3) != b"ply":
             raise InputFileError(f"{path}: not a PLY file: it does not begin with 'ply'")
         promised = _promised_vertices(file)
+    import trimesh  # here, because it takes long
+
     loaded = trimesh.load(path, file_type="ply", process=False)
     return _complete(path, np.asarray(loaded.vertices), promised)
 
@@ -149,6 +149,8 @@ def _complete(path: Path, points: np.ndarray, promised: int) -> np.ndarray:
 
 
 def _read_pcd(path: Path) -> np.ndarray:
+    from pypcd4 import PointCloud  # here, because it takes long
+
     cloud = PointCloud.from_path(path)
     missing = {"x", "y", "z"} - set(cloud.fields)
     if missing:

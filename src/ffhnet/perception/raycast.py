@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from jaxtyping import Bool, Float, Int
+
+if TYPE_CHECKING:
+    import trimesh
 
 _NO_HIT = 1e36
 """Embree leaves 1e37 where a ray hits nothing."""
