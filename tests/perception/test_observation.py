@@ -10,7 +10,7 @@ from ffhnet.geometry.transforms import apply, invert
 from ffhnet.perception.bps import encode
 from ffhnet.perception.camera import REALSENSE_D415, random_camera, render_depth
 from ffhnet.perception.cloud import depth_to_cloud
-from ffhnet.perception.observation import observe_depth, observe_object, observe_scene
+from ffhnet.perception.observation import observe_depth, observe_object, observe_objects, observe_scene
 from ffhnet.perception.sensor_noise import StereoNoise
 from ffhnet.perception.view_frame import view_frame
 
@@ -136,6 +136,30 @@ def test_same_seed_same_observation():
     np.testing.assert_array_equal(first.bps, second.bps)
 
 
+@pytest.mark.parametrize("tilt", [35, 90])
+def test_axes_of_computer_graphics_show_the_same_scene(tilt):
+    cloud, _ = depth_to_cloud(view(camera_at(tilt)), K)
+    turned = np.diag([1.0, -1.0, -1.0, 1.0])
+    usual = observe_scene(cloud, np.random.default_rng(0))
+    other = observe_scene(apply(turned, cloud), np.random.default_rng(0))
+    np.testing.assert_allclose(other.T_input_view, turned @ usual.T_input_view, atol=1e-9)
+    np.testing.assert_allclose(other.bps, usual.bps, atol=1e-6)
+    np.testing.assert_allclose(other.plane.height(apply(turned, cloud)), usual.plane.height(cloud), atol=1e-9)
+    assert other.table_height == pytest.approx(usual.table_height)
+
+
+def test_all_objects_are_the_ones_that_a_number_chooses():
+    depth = render_depth([box_on_table(), box_on_table(0.05, 0.22)], camera_at(45), K)
+    cloud, _ = depth_to_cloud(StereoNoise().apply(depth, K, np.random.default_rng(0)), K)
+    found = observe_objects(cloud, np.random.default_rng(0))
+    assert len(found) == 2
+    for i, seen in enumerate(found):
+        one = observe_scene(cloud, np.random.default_rng(0), object_index=i)
+        np.testing.assert_array_equal(seen.bps, one.bps)
+        assert seen.scene is not seen.cloud
+        assert len(seen.scene) == len(cloud)
+
+
 def test_bad_input_is_refused():
     rng = np.random.default_rng(0)
     depth = view(camera_at(35))
@@ -150,8 +174,8 @@ def test_bad_input_is_refused():
         observe_scene(cloud, rng, mask=np.ones(7, dtype=bool))
     with pytest.raises(SceneError, match="of the mask"):
         observe_depth(depth, K, rng, mask=np.zeros_like(depth, dtype=bool))
-    with pytest.raises(CloudError, match="optical frame"):
-        observe_scene(cloud * [1, -1, -1], rng)
+    with pytest.raises(CloudError, match="camera's frame"):
+        observe_scene(cloud - [0, 0, np.median(cloud[:, 2])], rng)
     with pytest.raises(CloudError, match="millimetres"):
         observe_scene(cloud * 1000, rng)
     with pytest.raises(OptionError, match="up direction"):

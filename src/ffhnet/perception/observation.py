@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from ffhnet.errors import CloudError, OptionError, SceneError
 from ffhnet.geometry.transforms import apply, invert
@@ -20,7 +20,10 @@ _CENTRED = 0.05
 """m: a cloud whose mean is nearer to the origin was centred; no camera sees an object so near."""
 
 _AHEAD = 0.95
-"""Least share of a scene's points that must lie in front of the camera."""
+"""Least share of a scene's points that must lie in front of the camera, whichever way its z axis points."""
+
+_BACKWARD = np.diag([1.0, -1.0, -1.0, 1.0])
+"""Between camera axes with z forward and those of computer graphics: x right, y up, z backward."""
 
 _LOWEST_PERCENT = 0.5
 """Percentile of the heights that counts as the object's lowest point: stray points lie lower."""
@@ -109,7 +112,8 @@ def observe_scene(
     """An object in a scene with a table, in the camera frame (section III).
 
     Args:
-        cloud_camera: the whole scene (m), camera at the origin, optical axes.
+        cloud_camera: the whole scene (m), camera at the origin; x right, y down, z forward, or as computer
+            graphics has it: x right, y up, z backward.
         rng: source of randomness for RANSAC.
         object_index: which of the objects found, 0 = the main one.
         mask: which points are the object, if that is known; `object_index` is then not used.
@@ -127,38 +131,72 @@ def observe_scene(
             )
         rows = np.reshape(cloud_camera, (-1, np.shape(cloud_camera)[-1]))
         mask = np.ravel(mask).astype(bool)[finite_rows(rows)]
-    return _observe_scene(cloud, rng, object_index, mask)
+    return _observe_one(_Scene.of(cloud, rng), object_index, mask)
 
 
-def _observe_scene(
-    cloud: Float[np.ndarray, "N 3"],
-    rng: np.random.Generator,
-    object_index: int,
-    mask: Bool[np.ndarray, " N"] | None,
-) -> Observation:
-    """`observe_scene` of a cloud that is known to be usable."""
-    ahead = np.count_nonzero(cloud[:, 2] > 0) / len(cloud)
-    if ahead < _AHEAD:
-        raise CloudError(
-            f"a scene must be in the camera's optical frame (z forward), but {100 * ahead:.0f} % of the "
-            "points have z > 0; for an object already cut out give the up direction"
+def observe_objects(cloud_camera: Float[np.ndarray, "N 3"], rng: np.random.Generator) -> list[Observation]:
+    """All objects in a scene with a table, the main one first; otherwise as `observe_scene`."""
+    scene = _Scene.of(validate_cloud(cloud_camera), rng)
+    return [scene.observe(members) for members in scene.objects()]
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """A usable cloud and its table.
+
+    Attributes:
+        cloud: as it came in (m).
+        optical: the same with z forward.
+        T_input_optical: from there back to the input frame.
+        plane: the table in the optical frame.
+    """
+
+    cloud: Float[np.ndarray, "N 3"]
+    optical: Float[np.ndarray, "N 3"]
+    T_input_optical: Float[np.ndarray, "4 4"]
+    plane: Plane
+
+    @classmethod
+    def of(cls, cloud: Float[np.ndarray, "N 3"], rng: np.random.Generator) -> _Scene:
+        ahead = np.count_nonzero(cloud[:, 2] > 0) / len(cloud)
+        if 1 - _AHEAD < ahead < _AHEAD:
+            raise CloudError(
+                f"a scene must be in the camera's frame (z forward, or backward), but {100 * ahead:.0f} % of "
+                "the points have z > 0; for an object already cut out give the up direction"
+            )
+        forward = ahead >= _AHEAD
+        optical = cloud if forward else apply(_BACKWARD, cloud)
+        return cls(cloud, optical, np.eye(4) if forward else _BACKWARD, fit_table(optical, rng))
+
+    def objects(self) -> list[Int[np.ndarray, " M"]]:
+        """Indices of the points of each object, the main one first."""
+        return segment_objects(self.optical, self.plane)
+
+    def observe(self, members: Int[np.ndarray, " M"]) -> Observation:
+        """The object that some of the points are."""
+        points, T = self.optical[members], self.T_input_optical
+        T_optical_view = view_frame(points, self.plane.normal, points.mean(axis=0))
+        table_height = -float(self.plane.height(T_optical_view[:3, 3]))
+        plane = self.plane.to_frame(T)
+        return _observation(
+            self.cloud[members], "camera", T @ T_optical_view, table_height, plane, self.cloud
         )
-    plane = fit_table(cloud, rng)
+
+
+def _observe_one(scene: _Scene, object_index: int, mask: Bool[np.ndarray, " N"] | None) -> Observation:
+    """One object by its number or mask."""
     if mask is None:
-        objects = segment_objects(cloud, plane)
+        objects = scene.objects()
         if not 0 <= object_index < len(objects):
             raise SceneError(
                 f"wanted object {object_index}, but the scene has {len(objects)} (counted from 0)"
             )
-        members = cloud[objects[object_index]]
-    else:
-        members = cloud[mask]
-        members = members[plane.height(members) > MIN_HEIGHT]
-        if len(members) < MIN_POINTS:
-            raise SceneError(f"wanted {MIN_POINTS} points of the mask above the table, got {len(members)}")
-    T_input_view = view_frame(members, plane.normal, members.mean(axis=0))
-    table_height = -float(plane.height(T_input_view[:3, 3]))
-    return _observation(members, "camera", T_input_view, table_height, plane, cloud)
+        return scene.observe(objects[object_index])
+    members = np.flatnonzero(mask)
+    members = members[scene.plane.height(scene.optical[members]) > MIN_HEIGHT]
+    if len(members) < MIN_POINTS:
+        raise SceneError(f"wanted {MIN_POINTS} points of the mask above the table, got {len(members)}")
+    return scene.observe(members)
 
 
 def observe_depth(
@@ -177,7 +215,7 @@ def observe_depth(
     chosen = None if mask is None else np.ravel(mask).astype(bool)[pixels]
     if len(cloud) < MIN_POINTS:
         raise CloudError(f"a depth image must have at least {MIN_POINTS} readings, got {len(cloud)}")
-    return _observe_scene(cloud, rng, object_index, chosen)
+    return _observe_one(_Scene.of(cloud, rng), object_index, chosen)
 
 
 def _observation(
