@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 
 import numpy as np
 import torch
 from jaxtyping import Float, Int
 
+from ffhnet.feasibility.reasons import Reason
 from ffhnet.feasibility.scene import ObservedScene
 from ffhnet.feasibility.shapes import PlacedShapes, Shapes
 from ffhnet.geometry.transforms import invert, make_transform
 from ffhnet.grasps import Grasps
 from ffhnet.hands import Hand
 from ffhnet.perception.observation import Observation
+from ffhnet.simulation.physics import Physics
 
 _PITCH = 0.02
 _CELL = 0.005
@@ -25,46 +26,31 @@ _RADIUS = 0.5
 """m around an object within which a hand is on its approach."""
 
 
-class Reason(IntEnum):
-    """Why a grasp cannot be done."""
-
-    FEASIBLE = 0
-    TABLE = 1  # the open hand at the grasp is below the table or too near
-    OBJECT = 2  # it penetrates the observed object
-    SCENE = 3  # it penetrates something else, or the closing fingers do
-    APPROACH = 4  # the straight way there is not free
-    UNREACHABLE = 5  # the arm does not reach the grasp, the way there, or the way up
-    ARM_COLLISION = 6  # the arm hits table, scene or itself there
-    NOT_TRIED = 7  # enough better grasps were found before the arm's way to this one was planned
-
-
 @dataclass(frozen=True)
 class Margins:
     """How near the hand may come to what was seen, m; negative is penetration.
 
-    The defaults were chosen against start collisions in physics: `docs/execution.md`.
+    The defaults were chosen against start collisions in physics: `docs/execution.md`, "Margins".
 
     Attributes:
         table: to the table.
         object: to the object's observed points.
         scene: to all other observed points.
-        standoff: m of straight approach, along the palm's x axis.
-        steps: poses checked along the approach, the grasp included.
     """
 
     table: float = 0.004
-    object: float = 0.0
+    object: float = 0.001
     scene: float = 0.004
-    standoff: float = 0.10
-    steps: int = 5
 
 
 class HandCheck:
     """Holds one hand's shapes against scenes."""
 
-    def __init__(self, hand: Hand, margins: Margins | None = None) -> None:
+    def __init__(self, hand: Hand, margins: Margins | None = None, physics: Physics | None = None) -> None:
+        """Makes the shapes of a hand ready; `physics` says how long the straight approach is."""
         self.hand = hand
         self.margins = margins or Margins()
+        self.physics = physics or Physics()
         self._shapes = Shapes.of(hand.tree, _PITCH)
 
     def look(self, observation: Observation) -> ObservedScene:
@@ -79,7 +65,7 @@ class HandCheck:
         retreat = -T_view_palm[:, :3, 0]
         opened = self._place(T_view_palm, self.hand.open(grasps.joints))
         to_table = opened.lowest() - scene.table
-        for back in np.linspace(0, margins.standoff, margins.steps):
+        for back in np.linspace(0, self.physics.approach_distance, self.physics.approach_steps):
             left = np.flatnonzero(reason == Reason.FEASIBLE)
             shift = back * retreat[left]
             to_object, to_scene = self._distances(opened, left, shift, scene)

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ffhnet.hands.hand import Hand
+
+_SAME_TIME = 1e-6
+"""s between waypoints that are one."""
 
 
 @dataclass(frozen=True)
@@ -61,34 +64,31 @@ def closing_trajectory(hand: Hand, joints: Float[np.ndarray, "N J"], period: flo
         joints: the grasps' joint angles, rad.
         period: s between updates of the targets in the trials, in which the arrival is counted.
     """
-    closing = hand.closing
-    rows = [_waypoints(hand, grasp, period) for grasp in joints]
-    width = max((len(row) for row in rows), default=0)
-    times = np.full((len(rows), width), np.nan)
-    targets = np.full((len(rows), width, hand.num_joints), np.nan)
-    for i, (grasp, when) in enumerate(zip(joints, rows, strict=True)):
-        opened = hand.open(grasp)
-        arrival = _arrival(hand, grasp - opened, period) * period
-        moving = np.minimum(when, closing.duration)[:, None]
-        beyond = np.maximum(moving - arrival, 0) * closing.speed * closing.moves
-        path = opened + (grasp - opened) * np.minimum(moving / arrival, 1) + beyond
-        times[i, : len(when)], targets[i, : len(when)] = when, np.minimum(path, hand.upper)
-    return JointTrajectory(times, targets)
+    closing, opened = hand.closing, hand.open(joints)
+    arrival = _arrival(hand, joints - opened, period)[:, None] * period
+    times = _waypoints(hand, joints, arrival)
+    moving = np.minimum(times, closing.duration)[:, :, None]
+    beyond = np.maximum(moving - arrival[:, None], 0) * closing.speed * closing.moves
+    way = (joints - opened)[:, None] * np.minimum(moving / arrival[:, None], 1)
+    return JointTrajectory(times, np.minimum(opened[:, None] + way + beyond, hand.upper))
 
 
-def _arrival(hand: Hand, way: Float[np.ndarray, " J"], period: float) -> int:
+def _arrival(hand: Hand, way: Float[np.ndarray, "*batch J"], period: float) -> Int[np.ndarray, "*batch"]:
     """Control periods until the fingers are at the grasp's joints."""
-    return max(round(way.max() / (hand.closing.speed * period)), 1)
+    return np.maximum(np.rint(way.max(axis=-1) / (hand.closing.speed * period)).astype(int), 1)
 
 
-def _waypoints(hand: Hand, joints: Float[np.ndarray, " J"], period: float) -> Float[np.ndarray, " W"]:
-    """Times (s) at which the speed of a target changes, the beginning and the end among them."""
+def _waypoints(
+    hand: Hand, joints: Float[np.ndarray, "N J"], arrival: Float[np.ndarray, "N 1"]
+) -> Float[np.ndarray, "N W"]:
+    """Times (s) at which the speed of a target changes, the beginning and the end among them; NaN at last."""
     closing = hand.closing
-    arrival = _arrival(hand, joints - hand.open(joints), period) * period
-    at_limit = arrival + ((hand.upper - joints) / closing.speed)[closing.moves > 0]
-    within = at_limit[at_limit < closing.duration]
-    ends = np.array(
-        [0.0, min(arrival, closing.duration), closing.duration, closing.duration + closing.squeeze]
-    )
-    times = np.sort(np.concatenate([ends, within]))
-    return times[np.diff(times, prepend=-1.0) > 1e-6]
+    closes = closing.moves > 0
+    at_limit = arrival + (hand.upper - joints)[:, closes] / closing.speed
+    at_limit[at_limit >= closing.duration] = np.nan
+    always = np.array([0.0, closing.duration, closing.duration + closing.squeeze])
+    ends = np.broadcast_to(always, (len(joints), 3))
+    times = np.sort(np.hstack([ends, np.minimum(arrival, closing.duration), at_limit]), axis=1)
+    times[:, 1:][np.diff(times, axis=1) < _SAME_TIME] = np.nan
+    times = np.sort(times, axis=1)
+    return times[:, : np.isfinite(times).sum(axis=1).max(initial=0)]

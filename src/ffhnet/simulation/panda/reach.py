@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -37,6 +38,7 @@ class Reach(IntEnum):
     HITS_TABLE = 3  # the arm does, not the hand
     HITS_OBJECT = 4
     HITS_ITSELF = 5  # the arm touches another link or the hand
+    BLOCKED = 6  # what the caller knows of is in the arm's way
 
 
 _HIT_BY_OWNER = {
@@ -99,12 +101,18 @@ class PandaReach:
         """Whether the arm reaches each grasp (world frame, table top z = 0)."""
         return self.plan(grasps, T_world_object).reachable
 
-    def plan(self, grasps: Grasps, T_world_object: Float[np.ndarray, "4 4"] | None = None) -> ArmPaths:
+    def plan(
+        self,
+        grasps: Grasps,
+        T_world_object: Float[np.ndarray, "4 4"] | None = None,
+        blocked: Callable[[Float[np.ndarray, "K 7"]], Bool[np.ndarray, " K"]] | None = None,
+    ) -> ArmPaths:
         """The arm's path for each grasp.
 
         Args:
             grasps: palm poses in the world frame, table top z = 0.
             T_world_object: pose of the object; needed where the scene has one.
+            blocked: says of joint angles whether anything that is not in the scene is in the arm's way.
 
         Raises:
             OptionError: a pose for no object, or none for one.
@@ -126,12 +134,20 @@ class PandaReach:
         reason = np.full(len(grasps), Reach.NO_POSTURE, dtype=np.int8)
         reason[~np.isnan(solutions).all(axis=(1, 2))] = Reach.NO_PATH
         chosen = np.full((len(grasps), *path.shape[2:]), np.nan)
-        for i in np.flatnonzero(smooth.any(axis=1)):
-            for k in np.argsort(np.where(smooth[i], jumps[i], np.inf), kind="stable")[: smooth[i].sum()]:
-                reason[i] = self._first_hit(path[i, k], grasps.joints[i], T_world_object)
-                if reason[i] == Reach.REACHABLE:
-                    chosen[i] = path[i, k]
-                    break
+        order = np.argsort(np.where(smooth, jumps, np.inf), axis=1, kind="stable")
+        for attempt in range(order.shape[1]):
+            k = order[:, attempt]
+            left = np.flatnonzero((reason != Reach.REACHABLE) & smooth[np.arange(len(k)), k])
+            found = path[left, k[left]]
+            hits = [
+                self._first_hit(q, grasps.joints[i], T_world_object) for i, q in zip(left, found, strict=True)
+            ]
+            reason[left] = hits
+            if blocked is not None:
+                in_the_way = blocked(found.reshape(-1, 7)).reshape(found.shape[:2]).any(axis=1)
+                reason[left[in_the_way]] = Reach.BLOCKED
+            done = reason[left] == Reach.REACHABLE
+            chosen[left[done]] = found[done]
         num_approach = len(self._approach)
         return ArmPaths(reason, chosen[:, :num_approach], chosen[:, num_approach:])
 
