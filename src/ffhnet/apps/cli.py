@@ -18,7 +18,19 @@ from typing import Annotated, Any, Union, cast
 
 import tyro
 
-from ffhnet.apps import benchmark, calibrate, data, distil, evaluate, generate, grasp, hand, objects, train
+from ffhnet.apps import (
+    benchmark,
+    calibrate,
+    data,
+    distil,
+    evaluate,
+    generate,
+    grasp,
+    hand,
+    objects,
+    train,
+    view,
+)
 from ffhnet.apps.ros2 import command as ros2
 from ffhnet.errors import FFHNetError
 
@@ -34,6 +46,7 @@ class Command:
 
 COMMANDS = (
     Command("grasp", grasp.GraspOptions, grasp.run),
+    Command("view", view.ViewOptions, view.run),
     Command("objects", objects.ObjectsOptions, objects.run),
     Command("hand", hand.HandOptions, hand.run),
     Command("generate", generate.GenerateOptions, generate.run),

@@ -70,9 +70,14 @@ def cloud_surface(cloud: Float[np.ndarray, "N 3"], detail: int = 60) -> Surface:
         vertex_normals=np.tile(ball.vertices, (len(points), 1)),
         process=False,
     )
+    return Surface(mesh, np.repeat(cloud_colors(points), n_faces, axis=0))
+
+
+def cloud_colors(points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 3"]:
+    """A colour (sRGB) for each point by its height z, dark below."""
     height = points[:, 2] - points[:, 2].min()
     share = (height / max(height.max(), 1e-9))[:, None]
-    return Surface(mesh, np.repeat(_CLOUD_LOW + share * (_CLOUD_HIGH - _CLOUD_LOW), n_faces, axis=0))
+    return _CLOUD_LOW + share * (_CLOUD_HIGH - _CLOUD_LOW)
 
 
 def arrow(length: float, radius: float, sections: int = 16) -> trimesh.Trimesh:

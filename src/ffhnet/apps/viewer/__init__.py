@@ -1,0 +1,1 @@
+"""The viewer in the browser: what was seen, the hands that would grasp it, and how they close and lift."""
