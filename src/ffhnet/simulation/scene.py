@@ -25,7 +25,8 @@ class Scene:
     Attributes:
         model, data: MuJoCo's; `data` is scratch space that every trial resets.
         joint_qpos: qpos index of each actuated joint, in the hand's order.
-        follower_qpos, leader_joint: qpos index of each coupled joint and the column of its leader.
+        finger_qpos, finger_angle: of each joint, coupled ones included, its qpos index and the actuated joint
+            whose angle it has.
         actuators: ctrl index of each actuated joint, in the hand's order.
         object_qpos: qpos index of the object's free joint.
         geom_owner: for each geom TABLE, OBJECT, HAND or ARM.
@@ -41,8 +42,8 @@ class Scene:
     model: mujoco.MjModel
     data: mujoco.MjData
     joint_qpos: Int[np.ndarray, " J"]
-    follower_qpos: Int[np.ndarray, " C"]
-    leader_joint: Int[np.ndarray, " C"]
+    finger_qpos: Int[np.ndarray, " F"]
+    finger_angle: Int[np.ndarray, " F"]
     actuators: Int[np.ndarray, " J"]
     object_qpos: int
     geom_owner: Int[np.ndarray, " G"]
@@ -60,8 +61,7 @@ class Scene:
 
     def place_fingers(self, joints: Float[np.ndarray, " J"]) -> None:
         """Sets the hand's joint angles (rad), coupled joints included, and leaves it where it is."""
-        self.data.qpos[self.joint_qpos] = joints
-        self.data.qpos[self.follower_qpos] = joints[self.leader_joint]
+        self.data.qpos[self.finger_qpos] = joints[self.finger_angle]
 
     def place_object(self, T_world_object: Float[np.ndarray, "4 4"]) -> None:
         """Sets the object's pose."""
@@ -177,15 +177,17 @@ def _set_options(spec: mujoco.MjSpec, physics: Physics) -> None:
 def _index(hand: Hand, physics: Physics, model: mujoco.MjModel) -> Scene:
     hand_body = model.body(MOUNT).id
     object_body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "object")
-    couplings = hand.tree.couplings
+    joint_qpos = [model.joint(PREFIX + name).qposadr[0] for name in hand.joint_names]
+    follower_qpos = [model.joint(PREFIX + c.follower).qposadr[0] for c in hand.tree.couplings]
+    leader = [hand.joint_names.index(c.leader) for c in hand.tree.couplings]
     return Scene(
         hand=hand,
         physics=physics,
         model=model,
         data=mujoco.MjData(model),
-        joint_qpos=np.array([model.joint(PREFIX + name).qposadr[0] for name in hand.joint_names]),
-        follower_qpos=np.array([model.joint(PREFIX + c.follower).qposadr[0] for c in couplings], dtype=int),
-        leader_joint=np.array([hand.joint_names.index(c.leader) for c in couplings], dtype=int),
+        joint_qpos=np.array(joint_qpos),
+        finger_qpos=np.array(joint_qpos + follower_qpos),
+        finger_angle=np.array([*range(hand.num_joints), *leader]),
         actuators=np.array([model.actuator(PREFIX + name).id for name in hand.joint_names]),
         object_qpos=int(model.jnt_qposadr[model.body_jntadr[object_body]]) if object_body >= 0 else -1,
         geom_owner=_body_owners(model)[model.geom_bodyid],
