@@ -3,8 +3,8 @@
     python benchmarks/ros2_stream.py --json ros2_stream.json
 
 Three processes on loopback: the node, a publisher, and this one, which subscribes. Every tenth cloud is
-broken. Latency runs from the stamp, taken just before a cloud is published, to the poses' arrival here. Leaves
-with status 1 where the node did not live through it. Needs ROS 2 and /proc (Linux).
+broken. Latency runs from the stamp, taken just before a cloud is published, to the poses' arrival here.
+Leaves with status 1 where the node did not live through it. Needs ROS 2 and /proc (Linux).
 """
 
 from __future__ import annotations
@@ -61,11 +61,12 @@ def main(options: Options) -> None:
     node = subprocess.Popen([sys.executable, "-c", program, "ros", "--num", str(options.num)])
     publisher = multiprocessing.get_context("spawn").Process(target=publish, args=(options,))
     try:
-        figures = watch(node.pid, publisher, options)
+        figures = watch(node, publisher, options)
         node.send_signal(signal.SIGINT)
         figures["exit_status"] = node.wait(timeout=60)
     finally:
         node.kill()
+        publisher.kill()
     print(json.dumps(figures, indent=2))
     if options.json is not None:
         options.json.write_text(json.dumps(figures, indent=2) + "\n")
@@ -114,7 +115,7 @@ def cloud_message(cloud: np.ndarray) -> PointCloud2:
     return message
 
 
-def watch(pid: int, publisher: Any, options: Options) -> dict[str, Any]:
+def watch(grasps: subprocess.Popen, publisher: Any, options: Options) -> dict[str, Any]:
     """Subscribe until the publisher is done; gives the figures."""
     rclpy.init()
     node = rclpy.create_node("watcher")
@@ -127,7 +128,7 @@ def watch(pid: int, publisher: Any, options: Options) -> dict[str, Any]:
         now, stamp = node.get_clock().now().nanoseconds, message.header.stamp
         latency.append(1e-9 * now - stamp.sec - 1e-9 * stamp.nanosec)
         poses.append(len(message.poses))
-        memory.append(resident(pid))
+        memory.append(resident(grasps.pid))
 
     def on_diagnostics(message: DiagnosticArray) -> None:
         health.update({item.key: item.value for item in message.status[0].values})
@@ -136,6 +137,8 @@ def watch(pid: int, publisher: Any, options: Options) -> dict[str, Any]:
     node.create_subscription(DiagnosticArray, "/diagnostics", on_diagnostics, 10)
     publisher.start()
     while publisher.is_alive():
+        if grasps.poll() is not None:
+            sys.exit(f"the node ended with status {grasps.returncode} while clouds came")
         rclpy.spin_once(node, timeout_sec=0.1)
     rclpy.shutdown()
     good = np.array(latency)[np.array(poses) > 0]

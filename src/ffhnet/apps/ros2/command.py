@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib.util import find_spec
 
 from ffhnet.apps.ros2.settings import RosOptions
@@ -18,6 +19,8 @@ def run(options: RosOptions) -> None:
             f"`ffhnet ros` needs {', '.join(missing)}: source the setup.bash of your ROS 2, "
             "or on Linux pip install 'ffhnet[ros]'"
         )
+    # A newcomer's computer should not be open to its network. Robots of several computers set SUBNET.
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     from ffhnet.apps.ros2.node import spin
 
     spin(options)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import array
 import dataclasses
+import os
 import signal
 import threading
 import traceback
@@ -15,7 +16,7 @@ from geometry_msgs.msg import PoseArray
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
@@ -36,8 +37,11 @@ from ffhnet.hands import load_hand
 from ffhnet.inference import FFHNet
 from ffhnet.perception.cloud import depth_to_cloud
 
-_QUEUE = 1
-"""Messages kept for a slow reader: an old answer is of no use to a robot."""
+_SENSOR = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""As ROS has it for sensors, but with the newest view only. It hears reliable publishers as well."""
+
+_ANSWER = QoSProfile(depth=1)
+"""Reliable, and only the newest: an old answer is of no use to a robot."""
 
 _LOG_EVERY = 5.0
 """s between lines of the log about refused views."""
@@ -70,21 +74,22 @@ class GraspNode(Node):
         self._views: Latest[View] = Latest()
         self._camera: CameraInfo | None = None
 
-        self._grasps = self.create_publisher(PoseArray, "~/grasps", _QUEUE)
-        self._table = self.create_publisher(PointCloud2, "~/table", _QUEUE)
-        self._preshape = self.create_publisher(JointTrajectory, "~/preshape", _QUEUE)
-        self._markers = self.create_publisher(MarkerArray, "~/markers", _QUEUE)
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", _QUEUE)
-        # A driver that sends reliably also reaches a reader with the sensors' best effort.
-        self.create_subscription(PointCloud2, "cloud", self._on_cloud, qos_profile_sensor_data)
-        self.create_subscription(Image, "depth", self._on_depth, qos_profile_sensor_data)
-        self.create_subscription(CameraInfo, "camera_info", self._on_camera, qos_profile_sensor_data)
+        self._grasps = self.create_publisher(PoseArray, "~/grasps", _ANSWER)
+        self._table = self.create_publisher(PointCloud2, "~/table", _ANSWER)
+        self._preshape = self.create_publisher(JointTrajectory, "~/preshape", _ANSWER)
+        self._markers = self.create_publisher(MarkerArray, "~/markers", _ANSWER)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", _ANSWER)
+        self.create_subscription(PointCloud2, "cloud", self._on_cloud, _SENSOR)
+        self.create_subscription(Image, "depth", self._on_depth, _SENSOR)
+        self.create_subscription(CameraInfo, "camera_info", self._on_camera, _SENSOR)
         self.create_service(Trigger, "~/trigger", self._on_trigger)
         self.create_timer(1.0, self._tell_health)
 
         self._busy = threading.Lock()
         self._worker = threading.Thread(target=self._work, name="grasps")
         self._worker.start()
+        reach = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE")
+        self.get_logger().info(f"grasps of {self._hand.name}; ROS_AUTOMATIC_DISCOVERY_RANGE is {reach}")
 
     def finish(self) -> None:
         """Wait for the worker to end with the view that it has."""
