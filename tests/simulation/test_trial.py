@@ -58,6 +58,20 @@ def test_side_grasp_lifts_a_can(hand, trial):
     assert (results.closed_joints[0] <= hand.upper + 0.1).all()
 
 
+@pytest.mark.parametrize(("distance", "held"), [(0.12, True), (0.40, False)])
+def test_contacts_are_counted_by_owner_and_link(hand, trial, distance, held):
+    trial.run(side_grasp(hand, distance), np.eye(4))
+    scene = trial._scene
+    geoms = scene.data.contact.geom
+    owners = scene.geom_owner[geoms]
+    by_hand = (owners == OBJECT).any(axis=1) & (owners == HAND).any(axis=1)
+    links = set(scene.model.geom_bodyid[geoms[by_hand][owners[by_hand] == HAND]])
+    on_table = (owners == [TABLE, OBJECT]).all(axis=1).any()
+    assert trial._touching() == (len(links), on_table)
+    assert (len(links) > 2, on_table) == (held, not held)
+    assert trial._hand_touches() == (owners == HAND).any()
+
+
 def test_far_hand_misses(hand, trial):
     results = trial.run(side_grasp(hand, 0.40), np.eye(4))
     assert Outcome(results.outcome[0]) == Outcome.MISSED
