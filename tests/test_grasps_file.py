@@ -7,8 +7,10 @@ import pytest
 
 from ffhnet.errors import InputFileError, OptionError
 from ffhnet.geometry.rotations import matrix_from_rotation_vector
+from ffhnet.grasp_plan import ArmMotion, GraspPlan
 from ffhnet.grasps import Grasps
-from ffhnet.grasps_file import load_grasps, save_grasps
+from ffhnet.grasps_file import load_grasps, load_plan, save_grasps, save_plan
+from ffhnet.hands import load_hand
 
 
 def make_grasps(count, scored=True, robust=True):
@@ -111,3 +113,67 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
         save_grasps(make_grasps(3), path)
     assert path.read_bytes() == before
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+def make_plan(kept, dropped, arm=False):
+    hand, rng = load_hand(), np.random.default_rng(1)
+
+    def draw(count):
+        return Grasps(
+            rotation=matrix_from_rotation_vector(rng.normal(size=(count, 3))),
+            position=rng.normal(size=(count, 3)),
+            joints=rng.uniform(hand.lower, hand.upper, size=(count, hand.num_joints)),
+            joint_names=hand.joint_names,
+            hand=hand.name,
+            frame="camera",
+            probability=rng.uniform(size=count),
+        )
+
+    reasons = tuple(["table", "object"][i % 2] for i in range(dropped))
+    motion = ArmMotion("panda", ("j1", "j2"), np.eye(4), rng.normal(size=(kept, 5, 2)), np.ones((kept, 3, 2)))
+    return GraspPlan.of(hand, draw(kept), draw(dropped), reasons, 0.1, 0.012, motion if arm else None)
+
+
+@pytest.mark.parametrize("suffix", [".json", ".npz"])
+@pytest.mark.parametrize(
+    ("kept", "dropped", "arm"), [(5, 3, True), (5, 0, False), (0, 4, True), (0, 0, False)]
+)
+def test_plans_come_back(tmp_path, suffix, kept, dropped, arm):
+    plan, path = make_plan(kept, dropped, arm), tmp_path / f"plan{suffix}"
+    save_plan(plan, path)
+    back = load_plan(path)
+    for wanted, came in ((plan.grasps, back.grasps), (plan.dropped, back.dropped)):
+        np.testing.assert_array_equal(came.position, wanted.position)
+        np.testing.assert_array_equal(came.joints, wanted.joints)
+        np.testing.assert_array_equal(came.probability, wanted.probability)
+    np.testing.assert_array_equal(load_grasps(path).position, plan.grasps.position)
+    np.testing.assert_allclose(back.pregrasp_position, plan.pregrasp_position, atol=1e-12)
+    np.testing.assert_array_equal(back.preshape, plan.preshape)
+    np.testing.assert_array_equal(back.torque_limit, plan.torque_limit)
+    assert (back.standoff, back.lead) == (plan.standoff, plan.lead)
+    assert back.reasons == plan.reasons
+    if kept:
+        np.testing.assert_allclose(back.closing.times, plan.closing.times, atol=1e-6)
+        np.testing.assert_allclose(back.closing.joints, plan.closing.joints, atol=1e-6)
+    assert (back.arm is None) == (not arm)
+    if arm:
+        assert back.arm.joint_names == plan.arm.joint_names
+        np.testing.assert_array_equal(back.arm.approach.reshape(-1), plan.arm.approach.reshape(-1))
+
+
+def test_times_in_json_end_with_the_motion(tmp_path):
+    """Grasps differ in the number of waypoints: JSON has no filling."""
+    plan = make_plan(6, 0)
+    assert np.isnan(plan.closing.times).any()
+    save_plan(plan, tmp_path / "plan.json")
+    for row in json.loads((tmp_path / "plan.json").read_text())["grasps"]:
+        assert None not in row["closing_times"]
+        assert len(row["closing_times"]) == len(row["closing_joint_angles"])
+        assert (np.diff(row["closing_times"]) > 0).all()
+
+
+def test_grasps_without_a_plan_are_no_plan(tmp_path):
+    for suffix in (".json", ".npz"):
+        save_grasps(make_grasps(2), tmp_path / f"grasps{suffix}")
+        with pytest.raises(InputFileError, match="not a grasp file"):
+            load_plan(tmp_path / f"grasps{suffix}")

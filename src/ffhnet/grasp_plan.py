@@ -97,6 +97,18 @@ class GraspPlan:
             reasons=reasons,
         )
 
+    def refused(self, reason: str) -> GraspPlan:
+        """The plan to do nothing, all grasps being dropped for one more reason."""
+        return dataclasses.replace(
+            self,
+            grasps=self.grasps[:0],
+            preshape=self.preshape[:0],
+            closing=JointTrajectory(self.closing.times[:0], self.closing.joints[:0]),
+            arm=None if self.arm is None else self.arm[:0],
+            dropped=Grasps.concatenate([self.grasps, self.dropped]),
+            reasons=len(self.grasps) * (reason,) + self.reasons,
+        )
+
     @property
     def pregrasp_position(self) -> Float[np.ndarray, "N 3"]:
         """Where the palm is before the approach, m; its rotation is that of the grasp."""

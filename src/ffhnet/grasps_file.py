@@ -1,26 +1,33 @@
-"""`Grasps` as files: JSON for people and robots, NPZ for arrays."""
+"""`Grasps` and `GraspPlan` as files; `docs/execution.md` describes every field."""
 
 from __future__ import annotations
 
-import io
-import json
-import zipfile
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
+from jaxtyping import Float
 
 from ffhnet.errors import InputFileError, OptionError
-from ffhnet.files import check_output, write_atomically
 from ffhnet.geometry.rotations import matrix_from_quaternion, quaternion_from_matrix
+from ffhnet.geometry.transforms import make_transform
+from ffhnet.grasp_plan import ArmMotion, GraspPlan
 from ffhnet.grasps import Grasps
+from ffhnet.hands.closing import JointTrajectory
+from ffhnet.table_file import SUFFIXES, Fields, read_tables, write_tables
 
-SUFFIXES = (".json", ".npz")
+__all__ = ["SCORE_NAMES", "SUFFIXES", "load_grasps", "load_plan", "save_grasps", "save_plan"]
 
 SCORE_NAMES = {"probability": "success_probability", "robustness": "robust_probability"}
 """What the scores of `Grasps` are called in files."""
 
+_GRASPS, _DROPPED = "grasps", "dropped"
 _UNIT_TOLERANCE = 1e-3
+_DECIMALS = 6
+"""Of the closing motion: micrometres at the fingertips."""
+
+Content = TypeVar("Content")
 
 
 def save_grasps(grasps: Grasps, path: str | Path) -> None:
@@ -34,31 +41,68 @@ def save_grasps(grasps: Grasps, path: str | Path) -> None:
     Raises:
         OptionError: another suffix, or the file cannot be written.
     """
-    path = Path(path)
-    check_output(path, SUFFIXES)
-    data = _to_json(grasps) if path.suffix.lower() == ".json" else _to_npz(grasps)
-    write_atomically(path, data)
+    write_tables(path, _header(grasps), {_GRASPS: _columns(grasps)})
+
+
+def save_plan(plan: GraspPlan, path: str | Path) -> None:
+    """Write what `save_grasps` writes of the feasible grasps, how they are done, and the dropped ones.
+
+    In an `.npz` the fields of dropped grasps begin with `dropped_`.
+
+    Raises:
+        OptionError: another suffix, or the file cannot be written.
+    """
+    columns = _columns(plan.grasps) | {
+        "pregrasp_palm_position": plan.pregrasp_position,
+        "preshape_joint_angles": plan.preshape,
+        "closing_times": plan.closing.times.round(_DECIMALS),
+        "closing_joint_angles": plan.closing.joints.round(_DECIMALS),
+    }
+    header = _header(plan.grasps) | {
+        "standoff": plan.standoff,
+        "torque_limits": plan.torque_limit,
+        "target_lead": plan.lead,
+    }
+    if plan.arm is not None:
+        T = plan.arm.T_frame_base
+        columns |= {
+            "arm_approach_joint_angles": plan.arm.approach,
+            "arm_lift_joint_angles": plan.arm.lift,
+        }
+        header |= {
+            "arm": plan.arm.robot,
+            "arm_joint_names": list(plan.arm.joint_names),
+            "arm_base_position": T[:3, 3],
+            "arm_base_quaternion_wxyz": quaternion_from_matrix(T[:3, :3]),
+        }
+    dropped = _columns(plan.dropped) | {"reason": np.array(plan.reasons, dtype=str)}
+    write_tables(path, header, {_GRASPS: columns, _DROPPED: dropped})
 
 
 def load_grasps(path: str | Path) -> Grasps:
-    """Read what `save_grasps` wrote.
+    """Read the grasps that `save_grasps` or `save_plan` wrote.
 
     Raises:
         InputFileError: the file is missing, damaged, or holds something else.
     """
-    path = Path(path)
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputFileError(f"{path}: a grasp file must end in {' or '.join(SUFFIXES)}, got '{path.suffix}'")
-    try:
-        fields = _read_json(path) if path.suffix.lower() == ".json" else _read_npz(path)
-        return _from_fields(fields)
-    except FileNotFoundError:
-        raise InputFileError(f"{path}: no such file") from None
-    except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, OptionError) as error:
-        raise InputFileError(f"{path}: not a grasp file ({type(error).__name__}: {error})") from error
+    return _load(path, _grasps)
 
 
-def _columns(grasps: Grasps) -> dict[str, np.ndarray | None]:
+def load_plan(path: str | Path) -> GraspPlan:
+    """Read what `save_plan` wrote.
+
+    Raises:
+        InputFileError: the file is missing, damaged, or holds something else, for example grasps without a
+            plan.
+    """
+    return _load(path, _plan)
+
+
+def _header(grasps: Grasps) -> Fields:
+    return {"hand": grasps.hand, "frame": grasps.frame, "joint_names": list(grasps.joint_names)}
+
+
+def _columns(grasps: Grasps) -> Fields:
     """What a file holds of each grasp, by the names it has there; None where it is not known."""
     return {
         "palm_position": grasps.position,
@@ -68,64 +112,82 @@ def _columns(grasps: Grasps) -> dict[str, np.ndarray | None]:
     }
 
 
-def _to_json(grasps: Grasps) -> bytes:
-    columns = {
-        name: [None] * len(grasps) if column is None else column.tolist()
-        for name, column in _columns(grasps).items()
-    }
-    rows = zip(*columns.values(), strict=True)
-    lines = [json.dumps(dict(zip(columns, row, strict=True))) for row in rows]
-    header = json.dumps({"hand": grasps.hand, "frame": grasps.frame, "joint_names": list(grasps.joint_names)})
-    # One grasp per line: indented JSON would take a line for each number.
-    return (header[:-1] + ', "grasps": [\n' + ",\n".join(lines) + "\n]}\n").encode()
+def _load(path: str | Path, make: Callable[[Fields], Content]) -> Content:
+    fields = read_tables(path, (_GRASPS, _DROPPED))
+    try:
+        return make(fields)
+    except (ValueError, KeyError, TypeError, OptionError) as error:
+        raise InputFileError(f"{path}: not a grasp file ({type(error).__name__}: {error})") from error
 
 
-def _to_npz(grasps: Grasps) -> bytes:
-    fields: dict[str, Any] = {
-        "hand": np.array(grasps.hand),
-        "frame": np.array(grasps.frame),
-        "joint_names": np.array(grasps.joint_names),
-        **{name: column for name, column in _columns(grasps).items() if column is not None},
-    }
-    buffer = io.BytesIO()
-    np.savez(buffer, **fields)
-    return buffer.getvalue()
+def _grasps(fields: Fields, table: str = _GRASPS) -> Grasps:
+    names = tuple(str(name) for name in fields["joint_names"])
+    known = {attribute: name for attribute, name in SCORE_NAMES.items() if _has(fields, table, name)}
+    return Grasps(
+        rotation=_rotation(_column(fields, table, "palm_quaternion_wxyz", 4)),
+        position=_column(fields, table, "palm_position", 3),
+        joints=_column(fields, table, "joint_angles", len(names)),
+        joint_names=names,
+        hand=str(fields["hand"]),
+        frame=str(fields["frame"]),
+        **{attribute: _column(fields, table, name) for attribute, name in known.items()},
+    )
 
 
-def _read_json(path: Path) -> dict[str, Any]:
-    content = json.loads(path.read_text(encoding="utf-8"))
-    rows = content["grasps"]
-    names = ("palm_position", "palm_quaternion_wxyz", "joint_angles")
-    fields = {name: [row[name] for row in rows] for name in names}
-    for name in SCORE_NAMES.values():
-        values = [row.get(name) for row in rows]
-        if None not in values:
-            fields[name] = values
-    return {**{name: content[name] for name in ("hand", "frame", "joint_names")}, **fields}
+def _plan(fields: Fields) -> GraspPlan:
+    grasps, dropped = _grasps(fields), _grasps(fields, _DROPPED)
+    count = grasps.joints.shape[1]
+    limits = [np.inf if limit is None else limit for limit in fields["torque_limits"]]
+    reasons = fields[f"{_DROPPED}_reason"] if len(dropped) else []
+    return GraspPlan(
+        grasps=grasps,
+        standoff=float(fields["standoff"]),
+        preshape=_column(fields, _GRASPS, "preshape_joint_angles", count),
+        closing=JointTrajectory(
+            times=_column(fields, _GRASPS, "closing_times", None),
+            joints=_column(fields, _GRASPS, "closing_joint_angles", None, count),
+        ),
+        torque_limit=np.array(limits, dtype=float),
+        lead=float(fields["target_lead"]),
+        arm=_arm(fields) if "arm" in fields else None,
+        dropped=dropped,
+        reasons=tuple(str(reason) for reason in reasons),
+    )
 
 
-def _read_npz(path: Path) -> dict[str, Any]:
-    with np.load(path, allow_pickle=False) as arrays:
-        return {name: arrays[name] for name in arrays.files}
+def _arm(fields: Fields) -> ArmMotion:
+    names = tuple(str(name) for name in fields["arm_joint_names"])
+    rotation = _rotation(np.asarray(fields["arm_base_quaternion_wxyz"], dtype=float)[None])[0]
+    return ArmMotion(
+        robot=str(fields["arm"]),
+        joint_names=names,
+        T_frame_base=make_transform(rotation, np.asarray(fields["arm_base_position"], dtype=float)),
+        approach=_column(fields, _GRASPS, "arm_approach_joint_angles", None, len(names)),
+        lift=_column(fields, _GRASPS, "arm_lift_joint_angles", None, len(names)),
+    )
 
 
-def _from_fields(fields: dict[str, Any]) -> Grasps:
-    joint_names = tuple(str(name) for name in fields["joint_names"])
-    quaternion = np.asarray(fields["palm_quaternion_wxyz"], dtype=float).reshape(-1, 4)
+_BEFORE = {_GRASPS: "", _DROPPED: f"{_DROPPED}_"}
+
+
+def _has(fields: Fields, table: str, name: str) -> bool:
+    """Whether a column is known; in an empty table every column is."""
+    return fields.get(table) == 0 or _BEFORE[table] + name in fields
+
+
+def _column(fields: Fields, table: str, name: str, *shape: int | None) -> np.ndarray:
+    """A column whose entries have this shape, None being any length."""
+    if fields.get(table) == 0:
+        return np.zeros((0, *(size or 0 for size in shape)))
+    column = np.asarray(fields[_BEFORE[table] + name], dtype=float)
+    came = column.shape[1:]
+    if len(came) != len(shape) or any(w not in (None, c) for w, c in zip(shape, came, strict=True)):
+        raise ValueError(f"{name} must have entries of shape {shape}, got {came}")
+    return column
+
+
+def _rotation(quaternion: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N 3 3"]:
     length = np.linalg.norm(quaternion, axis=1)
     if np.any(np.abs(length - 1) > _UNIT_TOLERANCE):
         raise ValueError(f"quaternions must have length 1, got {length[np.abs(length - 1).argmax()]:.4f}")
-    scores = {
-        attribute: np.asarray(fields[name], dtype=float)
-        for attribute, name in SCORE_NAMES.items()
-        if name in fields
-    }
-    return Grasps(
-        rotation=matrix_from_quaternion(quaternion) if len(quaternion) else np.zeros((0, 3, 3)),
-        position=np.asarray(fields["palm_position"], dtype=float).reshape(-1, 3),
-        joints=np.asarray(fields["joint_angles"], dtype=float).reshape(-1, len(joint_names)),
-        joint_names=joint_names,
-        hand=str(fields["hand"]),
-        frame=str(fields["frame"]),
-        **scores,
-    )
+    return matrix_from_quaternion(quaternion) if len(quaternion) else np.zeros((0, 3, 3))

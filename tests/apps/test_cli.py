@@ -46,11 +46,14 @@ def test_no_command_is_an_error(ffhnet):
 def test_grasp_from_a_depth_image(ffhnet, tmp_path, depth_png, untrained_weights):
     out, plot = tmp_path / "grasps.json", tmp_path / "grasps.png"
     arguments = (*INTRINSICS, "--weights", untrained_weights, "--num", 30, "--out", out, "--plot", plot)
+    arguments = (*arguments, "--no-feasibility")
     status, printed, err = ffhnet("grasp", depth_png, *arguments)
     assert (status, err) == (0, "")
     assert "30 grasps" in printed
     content = json.loads(out.read_text())
-    assert list(content) == ["hand", "frame", "joint_names", "grasps"]
+    assert list(content) == [
+        "hand", "frame", "joint_names", "standoff", "torque_limits", "target_lead", "grasps", "dropped",
+    ]  # fmt: skip
     assert content["hand"] == "dlr_hit_ii"
     assert content["frame"] == "camera"
     assert content["joint_names"] == list(load_hand().joint_names)
@@ -58,7 +61,8 @@ def test_grasp_from_a_depth_image(ffhnet, tmp_path, depth_png, untrained_weights
     for grasp in content["grasps"]:
         assert set(grasp) == {
             "palm_position", "palm_quaternion_wxyz", "joint_angles", "success_probability",
-            "robust_probability",
+            "robust_probability", "pregrasp_palm_position", "preshape_joint_angles", "closing_times",
+            "closing_joint_angles",
         }  # fmt: skip
     scores = [grasp["robust_probability"] for grasp in content["grasps"]]
     assert scores == sorted(scores, reverse=True)
@@ -93,6 +97,7 @@ def test_mask_and_segmentation_find_the_same_object(ffhnet, tmp_path, depth, dep
     found = []
     for name, extra in (("a.npz", ()), ("b.npz", ("--mask", mask))):
         arguments = (*INTRINSICS, "--weights", untrained_weights, "--num", 50, "--out", tmp_path / name)
+        arguments = (*arguments, "--no-feasibility")
         assert ffhnet("grasp", depth_png, *arguments, *extra)[0] == 0
         found.append(load_grasps(tmp_path / name).position.mean(axis=0))
     np.testing.assert_allclose(found[0], found[1], atol=0.01)
@@ -168,5 +173,5 @@ def test_shipped_weights_grasp_the_example(ffhnet, tmp_path, request):
     status, _, err = ffhnet("grasp", image, *INTRINSICS, "--out", out)
     assert (status, err) == (0, "")
     grasps = load_grasps(out)
-    assert len(grasps) == 400
+    assert 200 < len(grasps) <= 400
     assert grasps.probability[0] > 0.5

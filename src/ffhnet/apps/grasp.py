@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -18,11 +18,15 @@ from ffhnet.apps.capture_options import (
     observe_capture,
 )
 from ffhnet.apps.console import absent, busy, print_table
+from ffhnet.apps.extras import require_arm
 from ffhnet.errors import OptionError
 
 if TYPE_CHECKING:
+    from ffhnet.grasp_plan import GraspPlan
     from ffhnet.grasps import Grasps
     from ffhnet.hands import Hand
+    from ffhnet.inference import FFHNet
+    from ffhnet.perception.observation import Observation
 
 _SHOWN = 10
 
@@ -32,6 +36,13 @@ class GraspOptions(NetworkOptions, CaptureOptions):
     """Grasps for one object, ranked by the probability that they hold."""
 
     input: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(help=INPUT_HELP)]
+    feasibility: bool = True
+    """Leave out grasps at which the hand hits the table or what was seen, where a table was found."""
+    robot: Annotated[Literal["panda"] | None, absent("panda")] = None
+    """Leave out grasps that this arm does not reach, too, and give its joint angles for the best others."""
+    base: Annotated[tuple[float, float, float, float] | None, absent("X Y Z YAW")] = None
+    """Where the arm's base stands, metres and radians: ahead and to the left of the point of the table below
+    the camera, above the table; for a cloud with --world in its frame, but above the table."""
     max_failure: Annotated[float | None, absent("P")] = None
     """Abstain where the best grasp cannot be promised to fail at most this often, with 95 % confidence."""
     out: File = None
@@ -41,13 +52,14 @@ class GraspOptions(NetworkOptions, CaptureOptions):
 
 
 def run(options: GraspOptions) -> None:
-    """Observe, sample, rank; then show and write what was asked for."""
+    """Observe, sample, check, rank; then show and write what was asked for."""
     import numpy as np
 
     from ffhnet.files import check_output
-    from ffhnet.grasps_file import SUFFIXES, save_grasps
+    from ffhnet.grasps_file import SUFFIXES, save_plan
 
     check_capture(options.input, options)
+    _check_robot(options)
     if options.out is not None:
         check_output(options.out, SUFFIXES)
     if options.plot is not None:
@@ -55,41 +67,77 @@ def run(options: GraspOptions) -> None:
     with busy("loading"):
         observation = observe_capture(options.input, options, np.random.default_rng(options.seed))
         network, hand = load_network(options)
-    with busy("sampling and ranking grasps"):
-        grasps = network.grasp(observation, options.num, options.seed, options.threshold)
-    refusal = None
-    if options.max_failure is not None:
-        refusal = network.control_risk(options.max_failure).refusal(grasps.score)
-        grasps = grasps if refusal is None else grasps[:0]
+    with busy("sampling, checking and ranking grasps"):
+        plan = _plan(options, observation, network, hand)
+    message = _summary(plan)
+    if options.max_failure is not None and len(plan.grasps):
+        refusal = network.control_risk(options.max_failure).refusal(plan.grasps.score)
+        if refusal is not None:
+            plan, message = plan.refused("risk"), refusal
     # Files before anything is printed: a reader that closes the pipe early must not cost them.
     if options.out is not None:
-        save_grasps(grasps, options.out)
+        save_plan(plan, options.out)
     if options.plot is not None:
-        if len(grasps) == 0:
-            raise OptionError(
-                f"nothing to plot: {refusal or f'no grasp reaches the threshold {options.threshold:g}'}"
-            )
+        if len(plan.grasps) == 0:
+            raise OptionError(f"nothing to plot: {message}")
         with busy("drawing"):
             from ffhnet.evaluation.picture import grasp_picture
 
-            grasp_picture(observation, grasps, hand, options.plot, title=options.input.name)
-    if refusal is None:
-        _show(grasps, hand)
-    else:
-        print(refusal)
+            grasp_picture(observation, plan.grasps, hand, options.plot, title=options.input.name)
+    if len(plan.grasps):
+        _show(plan.grasps, hand)
+    print(message)
     if options.out is not None:
-        print(f"{len(grasps)} grasps written to {options.out}")
+        print(f"{len(plan.grasps)} grasps written to {options.out}")
     if options.plot is not None:
         print(f"picture written to {options.plot}")
+
+
+def _check_robot(options: GraspOptions) -> None:
+    """Raises where the options of the arm do not go together, or what it needs is not installed."""
+    if (options.robot is None) != (options.base is None):
+        raise OptionError("--robot and --base X Y Z YAW go together")
+    if options.robot is not None:
+        if not options.feasibility:
+            raise OptionError("--robot is a check of feasibility: not with --no-feasibility")
+        require_arm("grasp --robot")
+
+
+def _plan(options: GraspOptions, observation: Observation, network: FFHNet, hand: Hand) -> GraspPlan:
+    """The feasible grasps, or all of them where nothing is to be checked."""
+    from ffhnet.feasibility.planner import Planner, plan_unchecked
+
+    if options.base is not None:
+        from ffhnet.feasibility.arm import ArmCheck, Base
+
+        planner = Planner(network, hand, ArmCheck(hand, Base(*options.base)))
+    elif options.feasibility and observation.plane is not None:
+        planner = Planner(network, hand)
+    else:
+        return plan_unchecked(network.grasp(observation, options.num, options.seed, options.threshold), hand)
+    return planner.plan(observation, options.num, options.seed, options.threshold)
+
+
+def _summary(plan: GraspPlan) -> str:
+    """One line of how many grasps are feasible and why the others are not."""
+    from ffhnet.feasibility.reasons import Reason
+
+    counts = plan.counts
+    untried = counts.pop(Reason.NOT_TRIED.word, 0)
+    tried = len(plan.grasps) + len(plan.dropped) - untried
+    if tried == 0:
+        return "no grasp reaches the threshold"
+    parts = [f"{len(plan.grasps)} of {tried} grasps are feasible"]
+    parts += [f"dropped: {', '.join(f'{count} {reason}' for reason, count in counts.items())}"] * bool(counts)
+    parts += [f"{untried} not tried with the arm"] * (untried > 0)
+    return "; ".join(parts)
 
 
 def _show(grasps: Grasps, hand: Hand) -> None:
     """The best grasps as a table."""
     import numpy as np
 
-    if len(grasps) == 0 or grasps.probability is None:
-        print("no grasp reaches the threshold")
-        return
+    assert grasps.probability is not None
     flexion = np.degrees(grasps.joints[:, hand.closing.moves > 0].mean(axis=1))
     rows = [
         [

@@ -90,6 +90,12 @@ class Planner:
         )
 
 
+def plan_unchecked(grasps: Grasps, hand: Hand, physics: Physics | None = None) -> GraspPlan:
+    """How grasps are done, best first, whatever is in their way."""
+    physics = physics or Physics()
+    return GraspPlan.of(hand, grasps, grasps[:0], (), physics.approach_distance, physics.control_period)
+
+
 class _Ways:
     """The arm's ways to the best grasps of several batches, as far as they were asked for."""
 

@@ -29,6 +29,9 @@ POSITION_TOLERANCE = 5e-4
 ROTATION_TOLERANCE = 5e-3
 """rad by which an accepted solution may miss the wanted pose."""
 
+_LENGTH = 0.87
+"""m: the flange is never further from the shoulder, where the first two axes meet."""
+
 _ANY_Q7 = np.linspace(LOWER[6], UPPER[6], 26)[1:-1]
 _DAMPING = 1e-4
 
@@ -141,8 +144,10 @@ def inverse(
     """
     ik_full = _closed_form()
     home = np.zeros(7)
-    found = np.array([[ik_full(pose, home, value) for value in q7] for pose in T_base_flange])
-    found = found.reshape(len(T_base_flange), len(q7), 4, 7)
+    found = np.full((len(T_base_flange), len(q7), 4, 7), np.nan)
+    shoulder = np.array([0.0, 0.0, _D[0]])
+    for i in np.flatnonzero(np.linalg.norm(T_base_flange[:, :3, 3] - shoulder, axis=1) < _LENGTH):
+        found[i] = [np.reshape(ik_full(T_base_flange[i], home, value), (4, 7)) for value in q7]
     ok = ~np.isnan(found).any(axis=-1)
     wanted = np.broadcast_to(T_base_flange[:, None, None], (*found.shape[:-1], 4, 4))[ok]
     solutions = found[ok]
