@@ -24,6 +24,7 @@ from ffhnet.apps import (
     data,
     distil,
     evaluate,
+    export,
     generate,
     grasp,
     hand,
@@ -56,6 +57,7 @@ COMMANDS = (
     Command("calibrate", calibrate.CalibrateOptions, calibrate.run),
     Command("evaluate", evaluate.EvaluateOptions, evaluate.run),
     Command("benchmark", benchmark.BenchmarkOptions, benchmark.run),
+    Command("export", export.ExportOptions, export.run),
     Command("ros", ros2.RosOptions, ros2.run),
 )
 
