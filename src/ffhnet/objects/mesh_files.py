@@ -52,6 +52,10 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
     faces = np.asarray(getattr(mesh, "faces", ()))
     _check_face_count(len(faces), path)
     vertices = np.asarray(mesh.vertices, dtype=float)
+    if faces.shape[1:] != (3,) or vertices.shape[1:] != (3,):
+        raise InputFileError(
+            f"wanted triangles of points in {path}, got shapes {faces.shape}, {vertices.shape}"
+        )
     if faces.max() >= len(vertices) or faces.min() < 0:
         raise ObjectError(f"wanted faces of {len(vertices)} vertices, {path} names vertex {faces.max()}")
     if not np.isfinite(vertices).all():
@@ -106,8 +110,11 @@ def _stl_faces(file: BinaryIO) -> int | None:
 
 
 def _glb_faces(file: BinaryIO) -> int:
+    size = file.seek(0, 2)
     file.seek(12)
     length, _ = struct.unpack("<II", file.read(8))
+    if length > size:
+        raise ValueError("a header cannot be longer than its file")
     scene = json.loads(file.read(length))
     counts = [accessor["count"] for accessor in scene["accessors"]]
     primitives = [primitive for mesh in scene["meshes"] for primitive in mesh["primitives"]]
