@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from ffhnet.apps.console import absent, busy, progress_bar
+from ffhnet.apps.evaluate_arm import run_arm
 from ffhnet.apps.extras import require_sim
 from ffhnet.errors import OptionError
 
@@ -21,6 +22,11 @@ class EvaluateOptions:
 
     objects: str = "procedural-test:12"
     """procedural-test:COUNT, a folder of meshes, a mesh file, or the name of one object."""
+    protocol: Literal["paper", "arm"] = "paper"
+    """paper: grasps of a floating hand. arm: a Panda does the best feasible grasp of each scene; of the other
+    options it takes --weights, --placements, --samples, --seed, --json and --workers."""
+    neighbours: int = 0
+    """With the arm: other objects in each scene."""
     weights: Annotated[Path | None, absent("DIR", "the shipped weights")] = None
     """Folder of weights."""
     placements: int = 3
@@ -56,6 +62,10 @@ class EvaluateOptions:
 def run(options: EvaluateOptions) -> None:
     """Evaluate and print the tables."""
     require_sim("evaluate")
+    _check(options)
+    if options.protocol == "arm":
+        run_arm(options)
+        return
     import dataclasses
 
     from ffhnet.apps.evaluation_tables import print_evaluation
@@ -69,7 +79,6 @@ def run(options: EvaluateOptions) -> None:
     from ffhnet.files import check_output, write_atomically
     from ffhnet.objects.catalogue import resolve_objects
 
-    _check(options)
     for path, suffix in ((options.json, ".json"), (options.html, ".html")):
         if path is not None:
             check_output(path, (suffix,))

@@ -131,7 +131,7 @@ def with_density(obj: GraspObject, density: float | None) -> GraspObject:
 
 
 @lru_cache(maxsize=1)
-def _load_network(weights: str | None) -> FFHNet:
+def load_network(weights: str | None) -> FFHNet:
     """Networks of a worker process, loaded once."""
     return FFHNet.from_pretrained(weights, device="cpu")
 
@@ -165,7 +165,7 @@ class _ViewTrials:
     ) -> None:
         self._obj, self._T_world_object, self._view = obj, T_world_object, view
         self._protocol, self._streams = protocol, streams
-        self._network = _load_network(protocol.weights)
+        self._network = load_network(protocol.weights)
         self._hand: Hand = load_hand(self._network.info.hand)
         self._trial = GraspTrial(build_scene(self._hand, obj, protocol.physics))
 

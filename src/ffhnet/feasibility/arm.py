@@ -41,12 +41,18 @@ _RADIUS = 1.0
 
 @dataclass(frozen=True)
 class Base:
-    """Where the arm's base stands in the level frame of an observation (`level_frame`), m and rad."""
+    """Where the arm's base stands in an observation's level frame (`observed_level_frame`), m and rad."""
 
     x: float
     y: float
     z: float
     yaw: float
+
+    @classmethod
+    def of(cls, T_level_base: Float[np.ndarray, "4 4"]) -> Base:
+        """From a pose whose z axis points up."""
+        x, y, z = T_level_base[:3, 3]
+        return cls(float(x), float(y), float(z), float(np.arctan2(T_level_base[1, 0], T_level_base[0, 0])))
 
     @property
     def T_level_base(self) -> Float[np.ndarray, "4 4"]:
@@ -55,17 +61,30 @@ class Base:
         return make_transform(turn, np.array([self.x, self.y, self.z]))
 
 
-def level_frame(observation: Observation) -> Float[np.ndarray, "4 4"]:
+def level_frame(
+    up: Float[np.ndarray, " 3"], table: float, ahead: Float[np.ndarray, " 3"]
+) -> Float[np.ndarray, "4 4"]:
     """T_input_level: the frame in which a robot's base is given; its origin is on the table, z points up.
 
-    Of a capture in the camera's frame, the origin is below the camera and x is its optical axis projected on
-    the table. Of a cloud in a frame of its own it is that frame, moved up or down to the table.
+    Args:
+        up: direction against gravity in the input frame.
+        table: m along it from the input frame's origin to the table.
+        ahead: a direction in the input frame, whose projection on the table is x.
     """
-    up, T_input_view = observation.up, observation.T_input_view
-    ahead = np.array([0.0, 0.0, 1.0]) if observation.frame == "camera" else np.array([1.0, 0.0, 0.0])
     level = view_frame(np.zeros((1, 3)), up, ahead)
-    level[:3, 3] = (up @ T_input_view[:3, 3] + observation.table_height) * up
+    level[:3, 3] = table * level[:3, 2]
     return level
+
+
+def observed_level_frame(observation: Observation) -> Float[np.ndarray, "4 4"]:
+    """The level frame of an observation.
+
+    Of a capture in the camera's frame, the origin is below the camera, and x is the optical axis seen from
+    above. Of a cloud in a frame of its own it is that frame, moved up or down to the table.
+    """
+    ahead = np.eye(3)[2 if observation.frame == "camera" else 0]
+    table = observation.up @ observation.T_input_view[:3, 3] + observation.table_height
+    return level_frame(observation.up, float(table), ahead)
 
 
 class ArmCheck:
@@ -87,7 +106,7 @@ class ArmCheck:
         self, grasps: Grasps, observation: Observation, scene: ObservedScene
     ) -> tuple[Int[np.ndarray, " N"], ArmMotion]:
         """The `Reason` of each grasp (in the observation's input frame), and the arm's ways (NaN without)."""
-        T_input_level = level_frame(observation)
+        T_input_level = observed_level_frame(observation)
         T_view_base = invert(observation.T_input_view) @ T_input_level @ self._mounting.T_world_base
 
         def blocked(q: Float[np.ndarray, "K 7"]) -> Bool[np.ndarray, " K"]:

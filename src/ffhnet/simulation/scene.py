@@ -127,7 +127,7 @@ def build_scene(
     table.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.0, 1.0, 0.1])
 
     if obj is not None:
-        _add_object(spec, obj)
+        add_object(spec, obj)
     hand_spec = mujoco.MjSpec.from_file(str(hand.mjcf))
     mount = add_mount(spec)
     root = mount.add_frame().attach_body(hand_spec.worldbody.first_body(), PREFIX, "")
@@ -146,16 +146,17 @@ def build_scene(
     return _index(hand, physics, model)
 
 
-def _add_object(spec: mujoco.MjSpec, obj: GraspObject) -> None:
-    body = spec.worldbody.add_body(name="object")
+def add_object(spec: mujoco.MjSpec, obj: GraspObject, name: str = "object") -> None:
+    """Adds an object as a free body of this name, at the world's origin until it is placed."""
+    body = spec.worldbody.add_body(name=name)
     body.add_freejoint()
     density = obj.mass / sum(piece.volume for piece in obj.pieces)
     for i, piece in enumerate(obj.pieces):
-        mesh = spec.add_mesh(name=f"piece_{i}", uservert=np.asarray(piece.vertices, np.float32).ravel())
+        mesh = spec.add_mesh(name=f"{name}_{i}", uservert=np.asarray(piece.vertices, np.float32).ravel())
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
         # The world's bit 1 in both masks: every part of the hand names it as something to collide with.
         body.add_geom(
-            name=f"piece_{i}", type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"piece_{i}", density=density
+            name=f"{name}_{i}", type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"{name}_{i}", density=density
         )
 
 

@@ -204,7 +204,7 @@ class GraspTrial:
 
         row.outcome = Outcome.SLIPPED
         anchor = self._object_position()
-        lift = _quintic(physics.lift_duration, physics.control_period) * physics.lift_height
+        lift = quintic(physics.lift_duration, physics.control_period) * physics.lift_height
         for period, height in enumerate(lift, 1):
             self._scene.raise_hand(height)
             self._advance()
@@ -309,7 +309,7 @@ class GraspTrial:
         return len(links), on_table
 
 
-def _quintic(duration: float, period: float) -> Float[np.ndarray, " K"]:
+def quintic(duration: float, period: float) -> Float[np.ndarray, " K"]:
     """Smooth path from 0 to 1 that starts and ends at rest, one value per control period."""
     s = np.linspace(0, 1, max(round(duration / period), 1) + 1)[1:]
     return s**3 * (10 - 15 * s + 6 * s**2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 
@@ -15,11 +16,13 @@ from ffhnet.hands import Hand
 from ffhnet.objects.grasp_object import GraspObject
 from ffhnet.simulation.panda.kinematics import forward, refine
 from ffhnet.simulation.physics import Physics
-from ffhnet.simulation.scene import MOUNT, Scene, build_scene
+from ffhnet.simulation.scene import MOUNT, Scene, add_object, build_scene
 
 MODEL = Path(__file__).with_name("panda.xml")
 ARM_PREFIX = "panda/"
 """Before the names of the arm's joints and bodies in a scene."""
+NEIGHBOUR = 4
+"""Owner of the geoms of other objects, beside `TABLE`, `OBJECT`, `HAND` and `ARM`."""
 LIFT_DURATION = 2.0
 """s of the arm's lift. The sinking table of the floating hand lifts without accelerating the object. The arm
 does accelerate it, and in half a second by nearly half of gravity, which is another test: `docs/arm.md`."""
@@ -75,6 +78,7 @@ class ArmScene(Scene):
         velocity_gain: s; target speed times this is added to the targets, which takes away the lag that the
             actuators' damping would cause.
         posture: scratch space: what the arm is told at the moment.
+        neighbour_qpos: qpos index of the free joint of each other object.
     """
 
     mounting: Mounting
@@ -82,6 +86,7 @@ class ArmScene(Scene):
     arm_actuators: Int[np.ndarray, " 7"]
     velocity_gain: Float[np.ndarray, " 7"]
     posture: Posture
+    neighbour_qpos: Int[np.ndarray, " K"]
 
     def place_hand(self, T_world_root: Float[np.ndarray, "4 4"], joints: Float[np.ndarray, " J"]) -> None:
         """Sets the hand's joints, and the arm's so that the hand's root is at the pose, on its branch.
@@ -98,31 +103,48 @@ class ArmScene(Scene):
         self.data.ctrl[self.arm_actuators] = q
         self.posture.target, self.posture.height = q, 0.0
 
+    def place_neighbour(self, index: int, T_world_object: Float[np.ndarray, "4 4"]) -> None:
+        """Sets the pose of one of the other objects."""
+        q = self.neighbour_qpos[index]
+        self.data.qpos[q : q + 3] = T_world_object[:3, 3]
+        self.data.qpos[q + 3 : q + 7] = quaternion_from_matrix(T_world_object[:3, :3])
+
+    def drive_arm(self, q: Float[np.ndarray, " 7"]) -> None:
+        """Sends the arm to joint angles (rad) a control period ahead, and keeps it from lagging."""
+        speed = (q - self.posture.target) / self.physics.control_period
+        self.data.ctrl[self.arm_actuators] = q + self.velocity_gain * speed
+        self.posture.target = q
+
     def raise_hand(self, height: float) -> None:
         """Sends the arm to the joint angles with which the hand is `height` (m) over where it closed."""
         posture = self.posture
         T_base_flange = forward(posture.target)
         T_base_flange[:3, 3] += (height - posture.height) * self.mounting.T_world_base[2, :3]
         # One step: what it leaves is a thousandth of the way of a control period, and corrected in the next.
-        q = refine(posture.target, T_base_flange, steps=1)
-        speed = (q - posture.target) / self.physics.control_period
-        self.data.ctrl[self.arm_actuators] = q + self.velocity_gain * speed
-        posture.target, posture.height = q, height
+        self.drive_arm(refine(posture.target, T_base_flange, steps=1))
+        posture.height = height
 
 
 def build_arm_scene(
-    hand: Hand, obj: GraspObject | None, physics: Physics | None = None, mounting: Mounting | None = None
+    hand: Hand,
+    obj: GraspObject | None,
+    physics: Physics | None = None,
+    mounting: Mounting | None = None,
+    neighbours: Sequence[GraspObject] = (),
 ) -> ArmScene:
-    """Compiles the scene of one hand on the arm and one object, or none.
+    """Compiles the scene of one hand on the arm and one object, or none, and others that stand around.
 
     Args:
         hand: the hand.
         obj: the object, or None.
         physics: constants; those of the floating hand with a slower lift (`LIFT_DURATION`) if none are given.
         mounting: where the arm stands and how it carries the hand.
+        neighbours: other objects, at the world's origin until they are placed.
     """
     physics = physics or Physics(lift_duration=LIFT_DURATION)
     mounting = mounting or Mounting()
+
+    names = [f"neighbour_{i}" for i in range(len(neighbours))]
 
     def add_mount(spec: mujoco.MjSpec) -> mujoco.MjsBody:
         base = spec.worldbody.add_frame(
@@ -130,6 +152,8 @@ def build_arm_scene(
         )
         arm = mujoco.MjSpec.from_file(str(MODEL))
         base.attach_body(arm.body("link0"), ARM_PREFIX, "")
+        for i, neighbour in enumerate(neighbours):
+            add_object(spec, neighbour, names[i])
         return spec.body(f"{ARM_PREFIX}flange").add_body(
             name=MOUNT,
             pos=mounting.T_flange_root[:3, 3],
@@ -140,15 +164,18 @@ def build_arm_scene(
     model = scene.model
     # The controller knows the weight of the hand; fingers and object are too light to matter.
     model.body_gravcomp[model.body_parentid == model.body(MOUNT).id] = 1.0
-    names = [f"{ARM_PREFIX}joint{i}" for i in range(1, 8)]
-    actuators = np.array([model.actuator(name).id for name in names])
+    joints = [f"{ARM_PREFIX}joint{i}" for i in range(1, 8)]
+    actuators = np.array([model.actuator(joint).id for joint in joints])
     # In MuJoCo a position actuator's force is kp (target - angle) - kv speed.
     velocity_gain = model.actuator_biasprm[actuators, 2] / model.actuator_biasprm[actuators, 1]
+    bodies = [model.body(name) for name in names]
+    scene.geom_owner[np.isin(model.geom_bodyid, [body.id for body in bodies])] = NEIGHBOUR
     return ArmScene(
         **{f.name: getattr(scene, f.name) for f in fields(Scene)},
         mounting=mounting,
-        arm_qpos=np.array([model.joint(name).qposadr[0] for name in names]),
+        arm_qpos=np.array([model.joint(joint).qposadr[0] for joint in joints]),
         arm_actuators=actuators,
         velocity_gain=velocity_gain,
         posture=Posture(),
+        neighbour_qpos=np.array([model.jnt_qposadr[body.jntadr[0]] for body in bodies], dtype=int),
     )
