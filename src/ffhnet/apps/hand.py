@@ -99,8 +99,11 @@ def _compare_with_mujoco(hand: Hand) -> bool:
         data.joint(name).qpos = angle
     mujoco.mj_kinematics(model, data)
     ours = hand.tree.body_poses(torch.as_tensor(joints)[None], hand.joint_names)[0].numpy()
-    for body, pose in zip(hand.tree.bodies, ours, strict=True):
-        theirs = data.body(body.name)
+    if model.nbody != 1 + len(hand.tree.bodies):
+        raise HandError(f"MuJoCo finds {model.nbody - 1} bodies in {hand.mjcf.name}, ffhnet {len(ours)}")
+    # Both read the bodies in the order of the file; body 0 is the world.
+    for index, (body, pose) in enumerate(zip(hand.tree.bodies, ours, strict=True), start=1):
+        theirs = data.body(index)
         rotation = theirs.xmat.reshape(3, 3)
         if max(np.abs(pose[:3, 3] - theirs.xpos).max(), np.abs(pose[:3, :3] - rotation).max()) > _AGREEMENT:
             raise HandError(f"MuJoCo places body '{body.name}' elsewhere than ffhnet reads it")

@@ -16,6 +16,7 @@ from torch import Tensor
 from ffhnet.errors import HandError
 from ffhnet.geometry.rotations import matrix_from_euler_xyz
 from ffhnet.geometry.transforms import invert, make_transform
+from ffhnet.hands.confinement import check_inside
 from ffhnet.hands.kinematics import KinematicTree, read_mjcf
 
 if TYPE_CHECKING:
@@ -166,6 +167,7 @@ def _from_description(description: dict[str, Any], folder: Path) -> Hand:
     if unknown:
         raise HandError(f"closing.joints names unknown joints: {', '.join(sorted(unknown))}")
     palm = description["palm"]
+    check_inside(folder, Path(description["model"]))
     return Hand(
         name=description["name"],
         mjcf=folder / description["model"],

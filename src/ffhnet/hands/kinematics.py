@@ -20,6 +20,7 @@ from torch import Tensor
 from ffhnet.errors import HandError
 from ffhnet.geometry.rotations import matrix_from_quaternion
 from ffhnet.geometry.transforms import make_transform
+from ffhnet.hands.confinement import check_confined
 
 
 @dataclass(frozen=True)
@@ -133,6 +134,16 @@ def read_mjcf(path: Path) -> KinematicTree:
         root = ET.parse(path).getroot()
     except (OSError, ET.ParseError) as error:
         raise HandError(f"cannot read the hand model {path.name}: {error}") from error
+    check_confined(root, path)
+    try:
+        return _read_tree(root, path)
+    except (KeyError, ValueError, IndexError, RecursionError) as error:
+        raise HandError(
+            f"the hand model {path.name} is malformed ({type(error).__name__}: {error})"
+        ) from error
+
+
+def _read_tree(root: ET.Element, path: Path) -> KinematicTree:
     world = root.find("worldbody")
     tops = [] if world is None else world.findall("body")
     if len(tops) != 1:
