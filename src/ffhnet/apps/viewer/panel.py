@@ -54,7 +54,8 @@ def build_panel(gui: viser.GuiApi, examples: list[str], capture: CaptureOptions,
         capture: options of the command line; uploads start from them.
         threshold: where its slider stands at first.
     """
-    gui.configure_theme(control_layout="collapsible", show_logo=False, show_share_button=False)
+    gui.configure_theme(show_logo=False, show_share_button=False)
+    gui.main_panel.dock_right()
     gui.set_panel_label("ffhnet")
     d415 = REALSENSE_D415
     camera = capture.intrinsics or (d415.fx, d415.fy, d415.cx, d415.cy)
@@ -73,7 +74,7 @@ def build_panel(gui: viser.GuiApi, examples: list[str], capture: CaptureOptions,
         status = gui.add_html("")
     with gui.add_folder("Grasps"):
         threshold_slider = gui.add_slider("threshold", 0.0, 1.0, 0.01, threshold)
-        count = gui.add_slider("at most", 1, MOST_HANDS, 1, 8)
+        count = gui.add_slider("at most", 1, MOST_HANDS, 1, 5)
         distinct = gui.add_checkbox("no near-duplicates", True)
         shown = gui.add_html("")
         gui.add_html(legend())

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import torch
 import trimesh
 import viser
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ffhnet.apps.viewer.motion import Frame
 from ffhnet.apps.viewer.sight import Sight
@@ -20,14 +22,27 @@ from ffhnet.hands import Hand
 
 FIELD_OF_VIEW = np.radians(32.0)
 
-_FACES = 160
+_FACES = 400
 """Most faces of a link: dozens of hands are drawn at once, also by browsers without a graphics processor."""
 
+_AROUND = 0.2
+"""m around an object that the camera sees: the hands stand there."""
+
 _POINT = 0.0022  # m
+_PALM_OPACITY = 0.4
 _OBJECT = (236, 190, 130)
 _SQUARE = 0.05  # m
 _TABLE = (238, 240, 243)
 _LINES = (214, 218, 224)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Several links of a hand as one mesh: vertices (m) in the frames of their links."""
+
+    vertices: Float[np.ndarray, "V 3"]
+    link: Int[np.ndarray, " V"]
+    faces: Int[np.ndarray, "F 3"]
 
 
 class Stage:
@@ -39,11 +54,15 @@ class Stage:
         self._scene = server.scene
         self._links = [i for i, mesh in enumerate(hand.body_shapes) if len(mesh.faces)]
         self._meshes = {i: _light(hand.body_shapes[i]) for i in self._links}
-        self._crowd: dict[int, viser.MeshHandle] = {}
+        self._parts = {"palm": _join(self._meshes, [0]), "fingers": _join(self._meshes, self._links[1:])}
+        self._crowd: dict[int, list[viser.MeshHandle]] = {}
         self._moving: dict[int, viser.MeshHandle] = {}
         self._object: viser.MeshHandle | None = None
         self._scene.set_up_direction("+z")
         self._scene.world_axes.visible = False
+        # One sun with shadows, and light from everywhere that leaves the colours as the legend has them.
+        self._scene.configure_environment_map(None)
+        self._scene.add_light_ambient("/sky", intensity=1.1)
         self._scene.add_grid(
             "/table",
             plane="xy",
@@ -84,7 +103,7 @@ class Stage:
         middle = (low + high) / 2
         across = np.cross([0.0, 0.0, 1.0], sight.forward)
         towards = -sight.forward - 0.75 * across + np.array([0.0, 0.0, 0.62])
-        reach = 0.13 + float(np.linalg.norm(high - low)) / 2
+        reach = _AROUND + float(np.linalg.norm(high - low)) / 2
         position = middle + towards / np.linalg.norm(towards) * reach / np.sin(FIELD_OF_VIEW / 2)
         initial = self._server.initial_camera
         initial.position, initial.look_at, initial.fov = position, middle, FIELD_OF_VIEW
@@ -97,7 +116,8 @@ class Stage:
         Hands that are drawn already stay as they are: all calls between two sights are for the same grasps.
         """
         for index in set(self._crowd) - set(indices):
-            self._crowd.pop(index).remove()
+            for handle in self._crowd.pop(index):
+                handle.remove()
         for index in set(indices) - set(self._crowd):
             self._crowd[index] = self._add_hand(grasps, index)
 
@@ -108,7 +128,7 @@ class Stage:
 
     def hide_crowd(self, hidden: bool) -> None:
         """Takes the coloured hands out of sight while one of them moves, or puts them back."""
-        for handle in self._crowd.values():
+        for handle in itertools.chain.from_iterable(self._crowd.values()):
             handle.visible = not hidden
 
     def show_frame(self, frame: Frame) -> None:
@@ -127,17 +147,23 @@ class Stage:
         for handle in [*self._moving.values(), *([self._object] if self._object else [])]:
             handle.visible = False
 
-    def _add_hand(self, grasps: Grasps, index: int) -> viser.MeshHandle:
+    def _add_hand(self, grasps: Grasps, index: int) -> list[viser.MeshHandle]:
+        """Fingers, and a palm that hides neither them nor the object, in the colour of the probability."""
         assert grasps.probability is not None
         T_world_palm = make_transform(grasps.rotation[index], grasps.position[index])
         poses = self._link_poses(T_world_palm, grasps.joints[index])
-        mesh = trimesh.util.concatenate(
-            [self._meshes[link].copy().apply_transform(poses[link]) for link in self._links]
-        )
         color = _bytes(color_scale(grasps.probability[index : index + 1])[0])
-        handle = self._scene.add_mesh_simple(f"/hands/{index}", mesh.vertices, mesh.faces, color=color)
-        handle.on_click(lambda _: self._clicked(index))
-        return handle
+        handles = []
+        for name, opacity in (("palm", _PALM_OPACITY), ("fingers", None)):
+            part = self._parts[name]
+            rotation, position = poses[part.link, :3, :3], poses[part.link, :3, 3]
+            vertices = np.einsum("vij,vj->vi", rotation, part.vertices) + position
+            handle = self._scene.add_mesh_simple(
+                f"/hands/{index}/{name}", vertices, part.faces, color=color, opacity=opacity
+            )
+            handle.on_click(lambda _: self._clicked(index))
+            handles.append(handle)
+        return handles
 
     def _moving_link(self, link: int) -> viser.MeshHandle:
         if link not in self._moving:
@@ -152,6 +178,16 @@ class Stage:
     ) -> Float[np.ndarray, "L 4 4"]:
         T_palm_link = self._hand.body_poses(torch.as_tensor(joints, dtype=torch.float64)[None])[0].numpy()
         return T_world_palm @ T_palm_link
+
+
+def _join(meshes: dict[int, trimesh.Trimesh], links: Sequence[int]) -> _Part:
+    chosen = [meshes[link] for link in links]
+    first = np.cumsum([0, *(len(mesh.vertices) for mesh in chosen)])
+    return _Part(
+        vertices=np.concatenate([mesh.vertices for mesh in chosen]),
+        link=np.repeat(links, np.diff(first)),
+        faces=np.concatenate([mesh.faces + start for mesh, start in zip(chosen, first, strict=False)]),
+    )
 
 
 def _place(handle: viser.MeshHandle, pose: Float[np.ndarray, "4 4"]) -> None:

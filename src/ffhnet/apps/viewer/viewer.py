@@ -22,6 +22,12 @@ from ffhnet.errors import FFHNetError
 from ffhnet.evaluation.picture import distinct
 from ffhnet.hands import Hand
 
+_APART = 0.07
+"""m between the palms of two hands that are no near-duplicates; more than in pictures, which show three."""
+
+_TURNED = 50.0
+"""Degrees between such palms."""
+
 
 class Viewer:
     """One server, one scene: every browser that connects sees and moves the same."""
@@ -113,7 +119,11 @@ class Viewer:
             assert grasps.probability is not None
             above = np.flatnonzero(grasps.probability >= panel.threshold.value)
             most = int(panel.count.value)
-            chosen = above[distinct(grasps[above], most)] if panel.distinct.value else above[:most]
+            chosen = (
+                above[distinct(grasps[above], most, _APART, _TURNED)]
+                if panel.distinct.value
+                else above[:most]
+            )
             self._shown = [int(index) for index in chosen]
             self.stage.show_crowd(grasps, self._shown)
             self.stage.hide_crowd(self._chosen is not None)
