@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 from jaxtyping import Bool, Float, Int
 
-from ffhnet.dataset.records import read_tables, vectors
+from ffhnet.dataset.records import complaining, read_tables, vectors
 from ffhnet.errors import ObjectError
 from ffhnet.objects.procedural import FIRST_SEED, SPLIT_SIZE, seed_of
 from ffhnet.simulation.trial import Outcome
@@ -90,7 +90,8 @@ class TrialColumns:
 
 def read_trial_columns(folders: Sequence[Path]) -> TrialColumns:
     """The trials of one or more data sets, one after the other. Raises DatasetError."""
-    return TrialColumns.concatenate([_columns(read_tables(folder, "trials")) for folder in folders])
+    with complaining(folders):
+        return TrialColumns.concatenate([_columns(read_tables(folder, "trials")) for folder in folders])
 
 
 def split_of(object_name: str) -> str:

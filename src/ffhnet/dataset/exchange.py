@@ -197,7 +197,7 @@ def read_grasps(path: Path) -> ObjectGrasps:
             success=success,
             extra=_read_extra(content) if "gripper" in content else None,
         )
-    except (OSError, UnicodeDecodeError, KeyError, TypeError, ValueError, AttributeError) as error:
+    except (OSError, KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
         raise DatasetError(f"{path} is no grasp file ({type(error).__name__}: {error})") from error
     _check(found, path)
     return found

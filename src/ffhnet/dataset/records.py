@@ -7,7 +7,9 @@ object, `pack` joins them. See `docs/data.md` for every column.
 
 from __future__ import annotations
 
+import contextlib
 import json
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,9 @@ from ffhnet.grasps import Grasps
 from ffhnet.simulation.trial import Outcome, TrialResults
 
 FORMAT = 2
+_FEW_ROWS = 100_000
+"""Rows that may be of any size: made-up data compresses well."""
+
 PROPOSERS = ("heuristic", "power", "perturb", "learned")
 
 
@@ -166,10 +171,13 @@ def read_header(folder: Path) -> dict[str, Any]:
     path = folder / "dataset.json"
     try:
         header = json.loads(path.read_text())
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise DatasetError(f"{folder} is no data set: cannot read dataset.json ({error})") from error
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         raise DatasetError(f"{path} is not of format {FORMAT}")
+    missing = sorted({"hand", "joint_names", "closes"} - header.keys())
+    if missing:
+        raise DatasetError(f"{path} does not say {' and '.join(missing)}")
     return header
 
 
@@ -179,10 +187,30 @@ def read_tables(folder: Path, kind: str) -> pa.Table:
     if not files:
         raise DatasetError(f"{folder} holds no {kind}")
     try:
-        tables = [pq.read_table(file) for file in files]
-    except (OSError, pa.ArrowInvalid) as error:
+        for file in files:
+            _check_rows(pq.read_metadata(file).num_rows, file)
+        return pa.concat_tables([pq.read_table(file) for file in files]).unify_dictionaries()
+    except (OSError, pa.ArrowException) as error:
         raise DatasetError(f"{folder}: a file of {kind} is damaged ({error})") from error
-    return pa.concat_tables(tables).unify_dictionaries()
+
+
+def _check_rows(rows: int, file: Path) -> None:
+    """Raises DatasetError where a file is small for its rows: written to fill the memory of who reads it."""
+    size = file.stat().st_size
+    if rows > max(size, _FEW_ROWS):
+        raise DatasetError(f"{file} has {rows} rows in {size} bytes: no trials or views are that small")
+
+
+@contextlib.contextmanager
+def complaining(folders: Sequence[Path]) -> Iterator[None]:
+    """Says of whatever goes wrong inside that the data sets do not hold what they should."""
+    try:
+        yield
+    except (KeyError, ValueError, TypeError, AttributeError, pa.ArrowException) as error:
+        names = ", ".join(map(str, folders))
+        raise DatasetError(
+            f"{names}: a column is missing or malformed ({type(error).__name__}: {error})"
+        ) from error
 
 
 def pack(source: Path, target: Path) -> None:
@@ -204,6 +232,11 @@ def read_training_data(folders: list[Path]) -> TrainingData:
         raise DatasetError("wanted at least one data set, got none")
     if any((h["hand"], h["joint_names"]) != (headers[0]["hand"], headers[0]["joint_names"]) for h in headers):
         raise DatasetError("the data sets are of different hands or joint orders")
+    with complaining(folders):
+        return _training_data(headers[0], folders)
+
+
+def _training_data(header: dict[str, Any], folders: list[Path]) -> TrainingData:
     tables = [_plain(read_tables(folder, "trials")) for folder in folders]
     robust = np.concatenate([_robust(table, k) for k, table in enumerate(tables)])
     trials = pa.concat_tables(tables)
@@ -218,9 +251,9 @@ def read_training_data(folders: list[Path]) -> TrainingData:
 
     outcome = np.array(trials["outcome"].to_pylist())
     return TrainingData(
-        hand=headers[0]["hand"],
-        joint_names=tuple(headers[0]["joint_names"]),
-        closes=np.array(headers[0]["closes"], dtype=bool),
+        hand=header["hand"],
+        joint_names=tuple(header["joint_names"]),
+        closes=np.array(header["closes"], dtype=bool),
         object_names=tuple(objects.tolist()),
         placement_object=placement_object,
         view_placement=view_placement,

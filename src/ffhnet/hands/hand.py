@@ -148,7 +148,7 @@ def load_hand(name_or_toml: str = DEFAULT_HAND) -> Hand:
             raise HandError(f"unknown hand '{name_or_toml}': wanted one of {known}, or a .toml file")
     try:
         description = tomllib.loads(path.read_text())
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise HandError(f"cannot read the hand description {path}: {error}") from error
     try:
         hand = _from_description(description, path.parent)

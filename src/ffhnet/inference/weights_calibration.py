@@ -73,5 +73,5 @@ def load_calibration(folder: Path) -> WeightsCalibration | None:
             risk=RiskTable.from_json(content["risk"]),
             source=str(content["source"]),
         )
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise WeightsError(f"{path} is not a calibration: {error}") from error

@@ -118,9 +118,7 @@ def load_checkpoint(folder: Path, hand: str | None = None, device: torch.device 
     info, digests = _read_config(folder)
     if hand is not None and hand != info.hand:
         raise WeightsError(f"wanted weights for hand {hand!r}, {folder} holds weights for {info.hand!r}")
-    generator: Generator
-    generator = FlowGenerator(info.model) if info.model.generator == "flow" else FFHGenerator(info.model)
-    evaluator = FFHEvaluator(info.model)
+    generator, evaluator = _networks(info.model, folder)
     for name, network in ((GENERATOR_FILE, generator), (EVALUATOR_FILE, evaluator)):
         _load_weights(folder / name, digests.get(name), network)
         network.to(device).eval()
@@ -155,16 +153,41 @@ def _read_config(folder: Path) -> tuple[CheckpointInfo, dict[str, str]]:
             raise WeightsError(f"{path} is of another format than {FORMAT}, which this version reads")
         digests = content.pop("sha256")
         content["model"] = ModelConfig(**content["model"])
-        for name in ("joint_names", "joint_lower", "joint_upper"):
-            content[name] = tuple(content[name])
+        for name, kind in (("joint_names", str), ("joint_lower", float), ("joint_upper", float)):
+            content[name] = tuple(kind(value) for value in content[name])
         return CheckpointInfo(**content), digests
-    except (ValueError, KeyError, TypeError, AttributeError, OptionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OptionError) as error:
         raise WeightsError(f"{path} is not a checkpoint description: {error}") from error
 
 
-def _load_weights(path: Path, digest: str | None, network: nn.Module) -> None:
-    if not path.is_file() or digest is None:
+def _networks(config: ModelConfig, folder: Path) -> tuple[Generator, FFHEvaluator]:
+    """Both networks, not trained. Raises WeightsError where the folder cannot hold weights of their size."""
+    described = (
+        config.flow_blocks * config.flow_width**2 if config.generator == "flow" else 0,
+        config.inner_width * config.width,
+        config.bps_size * (config.pca_components or config.inner_width),
+    )
+    # A number takes two bytes or more. Larger networks would only fill the memory.
+    stored = sum(_existing(folder / name).stat().st_size for name in (GENERATOR_FILE, EVALUATOR_FILE)) // 2
+    if max(described) > stored:
+        raise WeightsError(
+            f"{folder / CONFIG_FILE} describes at least {max(described)} weights, there are at most {stored}"
+        )
+    try:
+        generator = FlowGenerator(config) if config.generator == "flow" else FFHGenerator(config)
+        return generator, FFHEvaluator(config)
+    except (RuntimeError, TypeError, ValueError, OverflowError, MemoryError) as error:
+        first_line = str(error).splitlines()[0]
+        raise WeightsError(f"{folder / CONFIG_FILE} describes no network: {first_line}") from error
+
+
+def _existing(path: Path) -> Path:
+    if not path.is_file():
         raise WeightsError(f"{path.name} is missing in {path.parent}")
+    return path
+
+
+def _load_weights(path: Path, digest: str | None, network: nn.Module) -> None:
     data = path.read_bytes()
     if hashlib.sha256(data).hexdigest() != digest:
         raise WeightsError(f"{path} is damaged: its checksum is not the one in {CONFIG_FILE}")

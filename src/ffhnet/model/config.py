@@ -8,6 +8,9 @@ from typing import Literal
 
 from ffhnet.errors import OptionError
 
+MAX_FLOW_STEPS = 1000
+"""More would not make samples better, only keep a robot waiting."""
+
 
 @dataclass(frozen=True)
 class ModelConfig:
@@ -67,6 +70,8 @@ class ModelConfig:
         sizes = (self.num_joints, self.bps_size, self.latent, *widths, self.flow_blocks, self.flow_steps)
         if min(sizes) < 1:
             raise OptionError(f"all sizes of ModelConfig must be at least 1, got {sizes}")
+        if self.flow_steps > MAX_FLOW_STEPS:
+            raise OptionError(f"flow_steps must be at most {MAX_FLOW_STEPS}, got {self.flow_steps}")
         if min(self.palm_points, self.flow_palm_points) < 0:
             counts = (self.palm_points, self.flow_palm_points)
             raise OptionError(f"palm_points and flow_palm_points must be at least 0, got {counts}")
