@@ -26,9 +26,8 @@ def run_arm(options: EvaluateOptions) -> None:
         check_output(options.json, (".json",))
     sources = resolve_objects(options.objects)
     if not 0 <= options.neighbours < len(sources):
-        raise OptionError(
-            f"--neighbours must be from 0 to {len(sources) - 1}, fewer than the objects, got {options.neighbours}"
-        )
+        most = len(sources) - 1
+        raise OptionError(f"--neighbours must be from 0 to {most}, got {options.neighbours}")
     protocol = ArmProtocol(
         weights=None if options.weights is None else str(options.weights),
         placements=options.placements,
