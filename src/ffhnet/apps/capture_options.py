@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from ffhnet.hands import Hand
     from ffhnet.inference import FFHNet
+    from ffhnet.perception.camera import Intrinsics
     from ffhnet.perception.observation import Observation
 
 INPUT_HELP = (
@@ -21,6 +22,9 @@ INPUT_HELP = (
     "A depth image, or a cloud without --up and --world, shows a whole scene with a table in the camera's "
     "frame: x right, y down, z forward. With one of the two a cloud is a single object, already cut out."
 )
+
+_MAX_PIXELS = 2**26
+"""Pixels of a mask; larger images are written to fill the memory."""
 
 Vector = Annotated[tuple[float, float, float] | None, absent("X Y Z")]
 File = Annotated[Path | None, absent("FILE")]
@@ -101,16 +105,11 @@ def observe_capture(path: Path, options: CaptureOptions, rng: np.random.Generato
     """
     import numpy as np
 
-    from ffhnet.perception.capture import read_cloud, read_depth
+    from ffhnet.perception.capture import read_cloud
     from ffhnet.perception.observation import observe_depth, observe_object, observe_scene
 
     if _is_depth(path, options):
-        from ffhnet.perception.camera import Intrinsics
-
-        depth = read_depth(path, options.depth_scale)
-        if options.intrinsics is None:
-            raise OptionError(f"{path}: a depth image needs --intrinsics FX FY CX CY")
-        intrinsics = Intrinsics(*options.intrinsics, width=depth.shape[1], height=depth.shape[0])
+        depth, intrinsics = _read_depth(path, options)
         mask = None if options.mask is None else _read_mask(options.mask)
         return observe_depth(depth, intrinsics, rng, mask=mask, object_index=options.object)
     cloud = read_cloud(path)
@@ -120,6 +119,29 @@ def observe_capture(path: Path, options: CaptureOptions, rng: np.random.Generato
     direction = None if options.camera is None else cloud.mean(axis=0) - np.array(options.camera)
     frame = "world" if options.world else "camera"
     return observe_object(cloud, up, frame, viewing_direction=direction)
+
+
+def observe_all(path: Path, options: CaptureOptions, rng: np.random.Generator) -> list[Observation]:
+    """All objects of a scene, the main one first; otherwise as `observe_capture`."""
+    from ffhnet.perception.capture import read_cloud
+    from ffhnet.perception.cloud import depth_to_cloud
+    from ffhnet.perception.observation import observe_objects
+
+    if options.up is not None or options.world or options.mask is not None or options.object != 0:
+        raise OptionError("--all-objects is for a whole scene: not with --up, --world, --mask or --object")
+    scene = depth_to_cloud(*_read_depth(path, options))[0] if _is_depth(path, options) else read_cloud(path)
+    return observe_objects(scene, rng)
+
+
+def _read_depth(path: Path, options: CaptureOptions) -> tuple[np.ndarray, Intrinsics]:
+    """A depth image (m) and its camera."""
+    from ffhnet.perception.camera import Intrinsics
+    from ffhnet.perception.capture import read_depth
+
+    depth = read_depth(path, options.depth_scale)
+    if options.intrinsics is None:
+        raise OptionError(f"{path}: a depth image needs --intrinsics FX FY CX CY")
+    return depth, Intrinsics(*options.intrinsics, width=depth.shape[1], height=depth.shape[0])
 
 
 def _is_depth(path: Path, options: CaptureOptions) -> bool:
@@ -135,9 +157,11 @@ def _read_mask(path: Path) -> np.ndarray:
 
     try:
         with Image.open(path) as image:
+            if image.width * image.height > _MAX_PIXELS:
+                raise ValueError(f"{image.width} x {image.height} pixels are more than any camera has")
             pixels = np.asarray(image)
     except FileNotFoundError:
         raise InputFileError(f"{path}: no such file") from None
-    except (OSError, SyntaxError, ValueError) as error:
+    except (OSError, SyntaxError, ValueError, MemoryError, Image.DecompressionBombError) as error:
         raise InputFileError(f"{path}: not a mask image, or damaged ({error})") from error
     return pixels != 0 if pixels.ndim == 2 else (pixels[..., :3] != 0).any(axis=-1)
