@@ -29,7 +29,7 @@ _AROUND = 0.2
 """m around an object that the camera sees: the hands stand there."""
 
 _POINT = 0.0022  # m
-_PALM_OPACITY = 0.4
+_PALM_OPACITY = 0.25
 _OBJECT = (236, 190, 130)
 _SQUARE = 0.05  # m
 _TABLE = (238, 240, 243)
@@ -62,7 +62,7 @@ class Stage:
         self._scene.world_axes.visible = False
         # One sun with shadows, and light from everywhere that leaves the colours as the legend has them.
         self._scene.configure_environment_map(None)
-        self._scene.add_light_ambient("/sky", intensity=1.1)
+        self._scene.add_light_ambient("/sky", intensity=1.8)
         self._scene.add_grid(
             "/table",
             plane="xy",
