@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -15,6 +16,7 @@ from ffhnet.apps.capture_options import (
     NetworkOptions,
     check_capture,
     load_network,
+    observe_all,
     observe_capture,
 )
 from ffhnet.apps.console import absent, busy, print_table
@@ -36,6 +38,8 @@ class GraspOptions(NetworkOptions, CaptureOptions):
     """Grasps for one object, ranked by the probability that they hold."""
 
     input: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(help=INPUT_HELP)]
+    all_objects: bool = False
+    """Grasps for every object of a scene; those of object K are written to NAME_K."""
     feasibility: bool = True
     """Leave out grasps at which the hand hits the table or what was seen, where a table was found."""
     robot: Annotated[Literal["panda"] | None, absent("panda")] = None
@@ -52,11 +56,11 @@ class GraspOptions(NetworkOptions, CaptureOptions):
 
 
 def run(options: GraspOptions) -> None:
-    """Observe, sample, check, rank; then show and write what was asked for."""
+    """Observe, then grasp one object or all of them."""
     import numpy as np
 
     from ffhnet.files import check_output
-    from ffhnet.grasps_file import SUFFIXES, save_plan
+    from ffhnet.grasps_file import SUFFIXES
 
     check_capture(options.input, options)
     _check_robot(options)
@@ -65,8 +69,33 @@ def run(options: GraspOptions) -> None:
     if options.plot is not None:
         check_output(options.plot, (".png",))
     with busy("loading"):
-        observation = observe_capture(options.input, options, np.random.default_rng(options.seed))
+        rng = np.random.default_rng(options.seed)
+        if options.all_objects:
+            seen = observe_all(options.input, options, rng)
+        else:
+            seen = [observe_capture(options.input, options, rng)]
         network, hand = load_network(options)
+    for number, observation in enumerate(seen):
+        if options.all_objects:
+            print(f"object {number} of {len(seen)}")
+        _grasp_one(_numbered(options, number), observation, network, hand)
+
+
+def _numbered(options: GraspOptions, number: int) -> GraspOptions:
+    """The options for one object, whose files are numbered where there are several objects."""
+
+    def numbered(path: Path | None) -> Path | None:
+        return path if path is None else path.with_stem(f"{path.stem}_{number}")
+
+    if not options.all_objects:
+        return options
+    return dataclasses.replace(options, out=numbered(options.out), plot=numbered(options.plot))
+
+
+def _grasp_one(options: GraspOptions, observation: Observation, network: FFHNet, hand: Hand) -> None:
+    """Sample, check, rank for one object; then show and write what was asked for."""
+    from ffhnet.grasps_file import save_plan
+
     with busy("sampling, checking and ranking grasps"):
         plan = _plan(options, observation, network, hand)
     message = _summary(plan)
@@ -77,20 +106,21 @@ def run(options: GraspOptions) -> None:
     # Files before anything is printed: a reader that closes the pipe early must not cost them.
     if options.out is not None:
         save_plan(plan, options.out)
-    if options.plot is not None:
-        if len(plan.grasps) == 0:
-            raise OptionError(f"nothing to plot: {message}")
+    if options.plot is not None and len(plan.grasps) == 0 and not options.all_objects:
+        raise OptionError(f"nothing to plot: {message}")
+    plot = options.plot if len(plan.grasps) else None
+    if plot is not None:
         with busy("drawing"):
             from ffhnet.evaluation.picture import grasp_picture
 
-            grasp_picture(observation, plan.grasps, hand, options.plot, title=options.input.name)
+            grasp_picture(observation, plan.grasps, hand, plot, title=options.input.name)
     if len(plan.grasps):
         _show(plan.grasps, hand)
     print(message)
     if options.out is not None:
         print(f"{len(plan.grasps)} grasps written to {options.out}")
-    if options.plot is not None:
-        print(f"picture written to {options.plot}")
+    if plot is not None:
+        print(f"picture written to {plot}")
 
 
 def _check_robot(options: GraspOptions) -> None:

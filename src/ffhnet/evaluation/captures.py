@@ -24,7 +24,7 @@ from ffhnet.perception.capture import read_cloud, read_depth
 from ffhnet.perception.cloud import depth_to_cloud
 from ffhnet.perception.observation import Observation, observe_object, observe_objects, observe_scene
 
-_TABLE_IN_MASK = "1=table"
+_TABLE_IN_MASK = "1 = table"
 """What `mask_origin` says where the number 1 of a mask is the table; else it is an object."""
 
 
