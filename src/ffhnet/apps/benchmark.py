@@ -1,16 +1,17 @@
-"""`ffhnet benchmark`: how fast trials run on this machine, and how far their labels can be trusted."""
+"""`ffhnet benchmark`: how fast every stage is here, and how far the labels of trials can be trusted."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+import os
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from ffhnet.apps.console import absent, print_table, progress_bar
 from ffhnet.apps.extras import require_sim
 from ffhnet.apps.machine import describe_machine
-from ffhnet.errors import OptionError
+from ffhnet.errors import MissingExtraError, OptionError
 
 if TYPE_CHECKING:
     from ffhnet.dataset.physics_benchmark import ObjectMeasurement
@@ -19,21 +20,40 @@ PIECES = ((1, 1), (2, 3), (4, 8), (9, 99))
 """Groups of objects by their number of convex pieces."""
 
 
+Part = Literal["inference", "perception", "startup", "training", "gpu", "physics"]
+PARTS: tuple[Part, ...] = ("startup", "perception", "inference", "gpu", "training", "physics")
+
+
 @dataclass(frozen=True)
 class BenchmarkOptions:
-    """Measure trials per second of a core, and the share of labels that flip at a four times finer time step.
+    """Measure how fast every stage is on this machine, and how far the labels of trials can be trusted.
 
-    The grasps are those that `ffhnet generate` would try, start collisions included. CPU time of one process.
+    Times are medians of rounds in which all that is compared runs once. Trials: CPU time of one process, for
+    the grasps that `ffhnet generate` would try, start collisions included.
     """
 
+    only: tuple[Part, ...] = PARTS
+    """What to measure; physics takes minutes, the rest about one."""
+    grasps: int = 400
+    """Grasps of an object."""
+    rounds: int = 15
+    """Rounds that count."""
+    threads: int = field(default_factory=lambda: os.cpu_count() or 1)
+    """Processor threads."""
+    clock: Literal["wall", "processor"] = "wall"
+    """Processor time makes sense of one thread on a busy machine."""
+    counts: tuple[int, ...] = (1, 10, 100, 1000, 10_000, 100_000)
+    """Numbers of grasps for the curve of time and memory."""
+    points: tuple[int, ...] = (500, 2000, 10_000, 50_000)
+    """Points of the clouds that are encoded."""
     objects: str = "procedural-val:40"
-    """Objects of the mix; see `ffhnet objects list`."""
+    """Objects of the trials; see `ffhnet objects list`."""
     first: int = 24
     """Leave out this many of them."""
     workers: int = 1
-    """Processes; more than one disturb each other's timing."""
+    """Processes for the trials; more than one disturb each other's timing."""
     weights: Annotated[Path | None, absent("DIR", "the package's own")] = None
-    """Weights whose generator proposes part of the mix."""
+    """Weights to measure, and whose generator proposes part of the trials."""
     learned: int = 45
     """Executed trials per placement of that generator, 0 to leave it out."""
     seed: int = 0
@@ -44,19 +64,42 @@ class BenchmarkOptions:
 
 def run(options: BenchmarkOptions) -> None:
     """Measure and print."""
-    require_sim("benchmark")
+    from ffhnet.files import check_output, write_atomically
+
+    if options.workers < 1 or options.first < 0 or options.learned < 0:
+        raise OptionError("--workers must be at least 1, --first and --learned at least 0")
+    if min(options.grasps, options.rounds, options.threads, *options.counts) < 1:
+        raise OptionError("--grasps, --rounds, --threads and --counts must be at least 1")
+    if options.json is not None:
+        check_output(options.json, (".json",))
+    report: dict[str, Any] = {"machine": describe_machine()}
+    others = [part for part in options.only if part != "physics"]
+    if others:
+        from ffhnet.apps.speed.report import measure_speed
+
+        report |= measure_speed(options, others)
+    if "physics" in options.only:
+        report |= _physics(options)
+    if options.json is not None:
+        write_atomically(options.json, (json.dumps(report, indent=2) + "\n").encode())
+
+
+def _physics(options: BenchmarkOptions) -> dict[str, Any]:
+    """The part of the report about trials."""
+    try:
+        require_sim("benchmark")
+    except MissingExtraError as missing:
+        if options.only == ("physics",):
+            raise
+        print(f"physics: skipped, {missing}")
+        return {"physics": {"skipped": str(missing)}}
 
     from ffhnet.dataset.executors import run_jobs
     from ffhnet.dataset.object_trials import GenerateConfig
     from ffhnet.dataset.physics_benchmark import measure_object
-    from ffhnet.files import check_output, write_atomically
     from ffhnet.inference.ffhnet import shipped_weights
     from ffhnet.objects.catalogue import resolve_objects
 
-    if options.workers < 1 or options.first < 0 or options.learned < 0:
-        raise OptionError("--workers must be at least 1, --first and --learned at least 0")
-    if options.json is not None:
-        check_output(options.json, (".json",))
     sources = resolve_objects(options.objects)[options.first :]
     if not sources:
         raise OptionError(f"--first {options.first} leaves out all of {options.objects}")
@@ -66,18 +109,8 @@ def run(options: BenchmarkOptions) -> None:
         measured = run_jobs(measure_object, [(source, config) for source in sources], options.workers, step)
     figures = _figures(measured)
     _print(measured, figures)
-    if options.json is not None:
-        report = {
-            "machine": describe_machine(),
-            "mix": {
-                "objects": options.objects,
-                "first": options.first,
-                "seed": options.seed,
-                "learned": options.learned,
-            },
-            "physics": figures,
-        }
-        write_atomically(options.json, (json.dumps(report, indent=2) + "\n").encode())
+    mix = {name: getattr(options, name) for name in ("objects", "first", "seed", "learned")}
+    return {"mix": mix, "physics": figures}
 
 
 def _figures(measured: list[ObjectMeasurement]) -> dict[str, Any]:

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import os
 import platform
+from importlib.metadata import PackageNotFoundError, version
 
 
 def describe_machine() -> dict[str, str | int | None]:
-    """Architecture, cores, and the versions of Python and MuJoCo (needs the sim extra)."""
-    import mujoco
-
+    """Architecture, cores, and versions (None for what is not installed)."""
     return {
         "architecture": platform.machine(),
         "cores": os.cpu_count(),
         "python": platform.python_version(),
-        "mujoco": mujoco.__version__,
+        **{name: _version(name) for name in ("numpy", "torch", "mujoco")},
     }
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None

@@ -78,7 +78,7 @@ def export_onnx(weights: Path, out: Path) -> Exported:
     files = Exported(out / GENERATOR_FILE, out / EVALUATOR_FILE, out / DESCRIPTION_FILE)
     _write(generator, (*look, noise), generator.INPUTS, generator.OUTPUTS, files.generator)
     _write(evaluator, (*look, *palms, joints), evaluator.INPUTS, evaluator.outputs, files.evaluator)
-    text = json.dumps(_description(info, generator, evaluator), indent=1) + "\n"
+    text = json.dumps(_description(info, generator.noise_width, files), indent=1) + "\n"
     write_atomically(files.description, text.encode())
     return files
 
@@ -107,13 +107,15 @@ def _write(
     onnx.checker.check_model(path)
 
 
-def _description(info: CheckpointInfo, generator: OnnxGenerator, evaluator: OnnxEvaluator) -> dict[str, Any]:
+def _description(info: CheckpointInfo, noise_width: int, files: Exported) -> dict[str, Any]:
     """What goes in, what comes out, in which frame, and how the basis is made."""
+    import onnx
+
     joints = len(info.joint_names)
     shapes: dict[str, list[int | str]] = {
         "bps": [info.model.bps_size],
         "table_height": [1],
-        "noise": ["grasps", generator.noise_width],
+        "noise": ["grasps", noise_width],
         "rotation": ["grasps", 3, 3],
         "position": ["grasps", 3],
         "joints": ["grasps", joints],
@@ -121,8 +123,16 @@ def _description(info: CheckpointInfo, generator: OnnxGenerator, evaluator: Onnx
         "robustness": ["grasps"],
     }
 
-    def table(names: Sequence[str]) -> dict[str, Any]:
-        return {name: {"shape": shapes[name], "meaning": MEANINGS[name]} for name in names}
+    def table(file: Path) -> dict[str, Any]:
+        # Without table heights the networks have one input less.
+        graph = onnx.load(file).graph
+        return {
+            kind: {
+                entry.name: {"shape": shapes[entry.name], "meaning": MEANINGS[entry.name]}
+                for entry in entries
+            }
+            for kind, entries in (("inputs", graph.input), ("outputs", graph.output))
+        }
 
     return {
         "hand": info.hand,
@@ -137,6 +147,5 @@ def _description(info: CheckpointInfo, generator: OnnxGenerator, evaluator: Onnx
             "recipe": f"r = numpy.random.RandomState({BASIS_SEED}); d = r.normal(size=(size, 3)); "
             "d /= norm of each row; points = d * r.uniform(size=(size, 1)) ** (1 / 3) * radius",
         },
-        GENERATOR_FILE: {"inputs": table(generator.INPUTS), "outputs": table(generator.OUTPUTS)},
-        EVALUATOR_FILE: {"inputs": table(evaluator.INPUTS), "outputs": table(evaluator.outputs)},
+        **{file.name: table(file) for file in (files.generator, files.evaluator)},
     }

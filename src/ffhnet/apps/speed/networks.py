@@ -1,0 +1,142 @@
+"""The networks' part: the engine against the plain modules, and against the paper's networks.
+
+Published way: the architecture of section III at full size, with the raw basis point set vector copied for
+every grasp, in the plain modules. Its weights are random, which changes nothing about time.
+"""
+
+from __future__ import annotations
+
+import resource
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import torch
+
+from ffhnet.apps.speed.clock import Clock, Times
+from ffhnet.inference.engine import Engine
+from ffhnet.model.checkpoint import Checkpoint
+from ffhnet.model.config import ModelConfig
+from ffhnet.model.evaluator import EvaluatorLogits, FFHEvaluator
+from ffhnet.model.flow import FlowGenerator
+from ffhnet.model.generator import FFHGenerator
+from ffhnet.model.tensors import GraspTensors, ObjectTensors
+
+NO_REDUCED = "bf16 and int8 were measured not to qualify on processors without AVX-512"
+
+Answer = tuple[GraspTensors, EvaluatorLogits]
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way from an object to rated grasps, in two stages and whole."""
+
+    generate: Callable[[], GraspTensors]
+    evaluate: Callable[[GraspTensors], EvaluatorLogits]
+
+    def __call__(self) -> Answer:
+        """Both stages."""
+        grasps = self.generate()
+        return grasps, self.evaluate(grasps)
+
+
+def published(objects: ObjectTensors, num: int) -> Way:
+    """The paper's networks with the object copied for every grasp."""
+    config = ModelConfig.paper()
+    generator, evaluator = FFHGenerator(config).eval(), FFHEvaluator(config).eval()
+    return Way(
+        lambda: generator.sample(objects.repeat(num), 1, _source()),
+        lambda grasps: evaluator(objects.repeat(num), grasps),
+    )
+
+
+def plain(checkpoint: Checkpoint, objects: ObjectTensors, num: int) -> Way:
+    """The modules of `ffhnet.model`."""
+    return Way(
+        lambda: checkpoint.generator.sample(objects, num, _source()),
+        lambda grasps: checkpoint.evaluator(objects, grasps),
+    )
+
+
+def fast(engine: Engine, objects: ObjectTensors, num: int) -> Way:
+    """The engine, which looks at the object again each time."""
+    seen = [engine.look(objects)]
+
+    def generate() -> GraspTensors:
+        seen[0] = engine.look(objects)
+        return seen[0].sample(num, _source())
+
+    return Way(generate, lambda grasps: seen[0].rate(grasps))
+
+
+def small(trained: Checkpoint) -> Checkpoint:
+    """The same evaluator with an untrained flow of the size that `ffhnet distil` makes."""
+    config = trained.info.model.student()
+    flow = FlowGenerator(config).eval()
+    if isinstance(trained.generator, FlowGenerator):
+        flow.take_constants(trained.generator)
+    return Checkpoint(replace(trained.info, model=config), flow, trained.evaluator)
+
+
+def largest_difference(checkpoint: Checkpoint, objects: ObjectTensors, num: int) -> float:
+    """Between engine and modules: of poses (m, rad) from the same noise, and of probabilities."""
+    wanted, logits = plain(checkpoint, objects, num)()
+    seen = Engine(checkpoint).look(objects)
+    got, rated = seen.sample(num, _source()), seen.rate(wanted)
+    pairs = [*zip(vars(wanted).values(), vars(got).values(), strict=True)]
+    for value, other in zip(vars(logits).values(), vars(rated).values(), strict=True):
+        if value is not None:
+            pairs.append((value.sigmoid(), other.sigmoid()))
+    return max((a - b).abs().max().item() for a, b in pairs)
+
+
+@torch.inference_mode()
+def measure_networks(
+    checkpoint: Checkpoint, objects: ObjectTensors, num: int, clock: Clock
+) -> tuple[dict[str, Times], dict[str, Any]]:
+    """Times of all ways, and figures of the contract: medians, factors, the largest difference."""
+    engine, student = Engine(checkpoint), small(checkpoint)
+    ways = {
+        "published": published(objects, num),
+        "plain": plain(checkpoint, objects, num),
+        "engine": fast(engine, objects, num),
+        "engine_distilled_size": fast(Engine(student), objects, num),
+    }
+    grasps = ways["engine"].generate()
+    stages: dict[str, Callable[[], object]] = {
+        "look": partial(engine.look, objects),
+        "generate": partial(engine.look(objects).sample, num, _source()),
+        "evaluate": partial(engine.look(objects).rate, grasps),
+    }
+    times = clock.in_turns({**ways, **stages})
+    slow = times["published"]
+    figures = {
+        **{f"{name}_ms": times[name].median for name in ways},
+        "reduced_ms": None,
+        "reduced_skipped": NO_REDUCED,
+        "times_faster_than_published": times["engine"].times_faster(slow),
+        "times_faster_than_plain": times["engine"].times_faster(times["plain"]),
+        "distilled_size_times_faster_than_published": times["engine_distilled_size"].times_faster(slow),
+        "largest_difference": largest_difference(checkpoint, objects, num),
+    }
+    return times, figures
+
+
+@torch.inference_mode()
+def measure_counts(
+    checkpoint: Checkpoint, objects: ObjectTensors, counts: Sequence[int], clock: Clock
+) -> list[dict[str, float]]:
+    """Time of the engine for growing numbers of grasps, and the largest memory of the process so far."""
+    engine, rows = Engine(checkpoint), []
+    for num in counts:
+        way = fast(engine, objects, num)
+        few = Clock(3 if num <= 1000 else 1, clock.now)
+        ms = few.in_turns({"way": way}, warm_up=1 if num <= 1000 else 0)["way"].median
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        rows.append({"grasps": num, "ms": ms, "us_per_grasp": 1e3 * ms / num, "peak_mib": peak})
+    return rows
+
+
+def _source() -> torch.Generator:
+    return torch.Generator().manual_seed(0)
