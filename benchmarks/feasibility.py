@@ -5,7 +5,7 @@
 On one noisy view of each held-out procedural object: the verdict on the network's samples, and on the same
 palms shaken by 2 cm and 0.25 rad, against start collisions in physics, which know the whole object; how many
 feasible grasps a Panda 0.6 m from the object reaches, by where it stands as the camera sees it; and the time
-from the depth image to the ranked list, the stages taking turns.
+of a processor from the depth image to the ranked list, the stages taking turns.
 """
 
 from __future__ import annotations
@@ -99,9 +99,9 @@ def main(options: Options) -> None:
         }
         for _ in range(3):
             for name, stage in stages.items():
-                begin = time.perf_counter()
+                begin = time.process_time()
                 stage()
-                seconds.setdefault(name, []).append(time.perf_counter() - begin)
+                seconds.setdefault(name, []).append(time.process_time() - begin)
         print(obj.name, {side: counts.tolist() for side, counts in reached.items()}, flush=True)
     report = {
         "options": {"objects": options.objects, "object_margin": options.object_margin, "seed": options.seed},

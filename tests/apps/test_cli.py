@@ -45,8 +45,8 @@ def test_no_command_is_an_error(ffhnet):
 
 def test_grasp_from_a_depth_image(ffhnet, tmp_path, depth_png, untrained_weights):
     out, plot = tmp_path / "grasps.json", tmp_path / "grasps.png"
-    arguments = (*INTRINSICS, "--weights", untrained_weights, "--num", 30, "--out", out, "--plot", plot)
-    arguments = (*arguments, "--no-feasibility")
+    weights = ("--weights", untrained_weights, "--no-feasibility")
+    arguments = (*INTRINSICS, *weights, "--num", 30, "--out", out, "--plot", plot)
     status, printed, err = ffhnet("grasp", depth_png, *arguments)
     assert (status, err) == (0, "")
     assert "30 grasps" in printed
@@ -96,8 +96,8 @@ def test_mask_and_segmentation_find_the_same_object(ffhnet, tmp_path, depth, dep
     Image.fromarray(pixels).save(mask)
     found = []
     for name, extra in (("a.npz", ()), ("b.npz", ("--mask", mask))):
-        arguments = (*INTRINSICS, "--weights", untrained_weights, "--num", 50, "--out", tmp_path / name)
-        arguments = (*arguments, "--no-feasibility")
+        weights = ("--weights", untrained_weights, "--no-feasibility")
+        arguments = (*INTRINSICS, *weights, "--num", 50, "--out", tmp_path / name)
         assert ffhnet("grasp", depth_png, *arguments, *extra)[0] == 0
         found.append(load_grasps(tmp_path / name).position.mean(axis=0))
     np.testing.assert_allclose(found[0], found[1], atol=0.01)
