@@ -65,10 +65,8 @@ KNOWN = {
 """Faults that stand, by case: whose they are, and what comes instead."""
 
 
-def cases():
-    for name, (file, content) in EVIL.items():
-        marks = [pytest.mark.xfail(strict=True, reason=KNOWN[name])] if name in KNOWN else []
-        yield pytest.param(file, content, id=name, marks=marks)
+def fault(name):
+    return [pytest.mark.xfail(strict=True, reason=KNOWN[name])] if name in KNOWN else []
 
 
 INCLUDES = {
@@ -96,7 +94,9 @@ def door(tmp_path):
     return enter
 
 
-@pytest.mark.parametrize(("file", "content"), cases())
+@pytest.mark.parametrize(
+    ("file", "content"), [pytest.param(*case, id=name, marks=fault(name)) for name, case in EVIL.items()]
+)
 def test_harm_is_refused(door, tmp_path, file, content):
     found, folder = door(file)
     trace = tmp_path / "code was run"

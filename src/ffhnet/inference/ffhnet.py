@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 
 VIEW_FRAME = "view"
 
+_FARTHEST = 10.0
+"""m: an observation of something farther off than this was made of stray points."""
+
 
 class FFHNet:
     """FFHGenerator and FFHEvaluator of one hand (figure 1).
@@ -165,6 +168,9 @@ class FFHNet:
         wanted = self.info.model.bps_size
         if np.shape(observation.bps) != (wanted,):
             raise OptionError(f"these networks take {wanted} BPS values, got {np.shape(observation.bps)}")
+        farthest = max(np.abs(observation.bps).max(), abs(observation.table_height))
+        if not farthest <= _FARTHEST:
+            raise OptionError(f"an object and its table lie within {_FARTHEST:g} m, got {farthest:g} m")
         bps = torch.as_tensor(observation.bps, dtype=torch.float32, device=self.device)
         height = torch.tensor([observation.table_height], dtype=torch.float32, device=self.device)
         return self._engine.look(ObjectTensors(bps.unsqueeze(0), height))
