@@ -133,6 +133,7 @@ def build_scene(
     root = mount.add_frame().attach_body(hand_spec.worldbody.first_body(), PREFIX, "")
     if mount.mocap:
         # The palm stands as still as the table, and MuJoCo only looks at such pairs where they are named.
+        # These contacts are found but push nothing, so that their friction does not matter.
         for geom in root.geoms:
             spec.add_pair(geomname1="table", geomname2=geom.name)
     for geom in spec.geoms:
