@@ -24,9 +24,9 @@ import sys
 import numpy as np, torch
 sys.path.append({here!r})
 from test_determinism import FIELDS, grasp, observe
-torch.set_num_threads(int(sys.argv[2]))
+torch.set_num_threads(1)
 grasps = grasp(observe())
-np.savez(sys.argv[1], **{{name: getattr(grasps, name) for name in FIELDS}})
+np.savez({path!r}, **{{name: getattr(grasps, name) for name in FIELDS}})
 """
 
 
@@ -40,20 +40,24 @@ def grasp(observation):
     return FFHNet.from_pretrained(device="cpu").grasp(observation, num=150, seed=5)
 
 
-def elsewhere(path: Path, threads: int) -> dict[str, np.ndarray]:
-    """The arrays of the grasps of another process with so many threads."""
-    program = PROGRAM.format(here=str(Path(__file__).parent))
-    subprocess.run([sys.executable, "-c", program, str(path), str(threads)], check=True)
-    with np.load(path) as arrays:
-        return dict(arrays)
+@pytest.fixture(scope="module", autouse=True)
+def one_thread_first():
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
+
+
+@pytest.fixture
+def threads(request):
+    torch.set_num_threads(request.param)
+    yield request.param
+    torch.set_num_threads(1)
 
 
 @pytest.fixture(scope="module")
-def grasps():
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield grasp(observe())
-    torch.set_num_threads(threads)
+def grasps(one_thread_first):
+    return grasp(observe())
 
 
 def test_again_in_this_process_to_the_bit(grasps):
@@ -63,18 +67,22 @@ def test_again_in_this_process_to_the_bit(grasps):
 
 
 def test_in_another_process_to_the_bit(grasps, tmp_path):
-    there = elsewhere(tmp_path / "grasps.npz", threads=1)
-    for name in FIELDS:
-        np.testing.assert_array_equal(there[name], getattr(grasps, name), err_msg=name)
+    path = tmp_path / "grasps.npz"
+    program = PROGRAM.format(here=str(Path(__file__).parent), path=str(path))
+    subprocess.run([sys.executable, "-c", program], check=True)
+    with np.load(path) as there:
+        for name in FIELDS:
+            np.testing.assert_array_equal(there[name], getattr(grasps, name), err_msg=name)
 
 
-def test_with_more_threads_up_to_rounding(grasps, tmp_path):
-    there = elsewhere(tmp_path / "grasps.npz", threads=4)
+@pytest.mark.parametrize("threads", [2, 4], indirect=True)
+def test_with_more_threads_up_to_rounding(grasps, threads):
+    found = grasp(observe())
     # Rounding may swap neighbours in the ranking: compare what was found, not its order.
     for name in ("probability", "robustness"):
-        np.testing.assert_allclose(np.sort(there[name]), np.sort(getattr(grasps, name)), atol=1e-4)
-    order = [np.lexsort(np.round(position, 3).T) for position in (there["position"], grasps.position)]
-    np.testing.assert_allclose(there["position"][order[0]], grasps.position[order[1]], atol=1e-4)
+        np.testing.assert_allclose(np.sort(getattr(found, name)), np.sort(getattr(grasps, name)), atol=1e-4)
+    order = [np.lexsort(np.round(position, 3).T) for position in (found.position, grasps.position)]
+    np.testing.assert_allclose(found.position[order[0]], grasps.position[order[1]], atol=1e-4)
 
 
 def test_four_threads_at_one_model_to_the_bit(grasps):

@@ -25,7 +25,7 @@ def door(request, tmp_path_factory):
 
 @given(chance=st.randoms(use_true_random=False))
 @settings(
-    max_examples=25,
+    max_examples=15,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],

@@ -135,36 +135,41 @@ def test_a_mesh_of_another_file_is_refused(door):
         found.open(folder)
 
 
+NAMING = (
+    ("cloud", "cloud.ply", b"element", b"comment TextureFile ../private.png\n"),
+    ("mesh", "mesh.ply", b"element", b"comment TextureFile ../private.png\n"),
+    ("mesh", "mesh.obj", b"v ", b"mtllib ../private.mtl\n"),
+)
+"""What is put before which bytes of a file, so that it names another one."""
+
 OPENED = """
 import sys
-sys.path[:0] = [{here!r}]
+sys.path.append({here!r})
 opened = []
 sys.addaudithook(lambda event, arguments: opened.append(str(arguments[0])) if event == "open" else None)
 from pathlib import Path
 from doors import DOORS
-door = next(door for door in DOORS if door.file == {file!r} and door.name.startswith({kind!r}))
-door.open(Path({folder!r}))
-assert any({file!r} in name for name in opened), "the hook hears nothing"
+from test_malicious import NAMING
+for kind, file, _, _ in NAMING:
+    door = next(door for door in DOORS if door.file == file and door.name.startswith(kind))
+    door.open(Path({root!r}, kind))
+    assert any(name.endswith(file) for name in opened), "the hook hears nothing"
 sys.exit(", ".join(name for name in opened if name.endswith(("private.png", "private.mtl"))) or 0)
 """
 
 
-@pytest.mark.parametrize(
-    ("kind", "file", "before", "line"),
-    [
-        ("cloud", "cloud.ply", b"element", b"comment TextureFile ../private.png\n"),
-        ("mesh", "mesh.ply", b"element", b"comment TextureFile ../private.png\n"),
-        ("mesh", "mesh.obj", b"v ", b"mtllib ../private.mtl\n"),
-    ],
-)
-def test_what_a_file_names_is_not_opened(door, kind, file, before, line):
-    _, folder = door(file, kind)
-    (folder.parent / "private.mtl").write_text("newmtl m\nmap_Kd private.png\n")
-    Image.fromarray(np.zeros((2, 2), np.uint8)).save(folder.parent / "private.png")
-    content = (folder / file).read_bytes()
-    assert before in content
-    (folder / file).write_bytes(content.replace(before, line + before, 1))
-    program = OPENED.format(here=str(Path(__file__).parent), file=file, kind=kind, folder=str(folder))
+def test_what_a_file_names_is_not_opened(tmp_path):
+    (tmp_path / "private.mtl").write_text("newmtl m\nmap_Kd private.png\n")
+    Image.fromarray(np.zeros((2, 2), np.uint8)).save(tmp_path / "private.png")
+    for kind, file, before, line in NAMING:
+        (tmp_path / kind).mkdir(exist_ok=True)
+        next(door for door in DOORS if door.file == file and door.name.startswith(kind)).build(
+            tmp_path / kind
+        )
+        content = (tmp_path / kind / file).read_bytes()
+        assert before in content
+        (tmp_path / kind / file).write_bytes(content.replace(before, line + before, 1))
+    program = OPENED.format(here=str(Path(__file__).parent), root=str(tmp_path))
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 
