@@ -67,6 +67,16 @@ pre-grasp pose of the best feasible grasp to the palm (dot); objects without one
 |---|---|---|---|---|---|
 """
 
+PHYSICS = """
+## Real depth, physics
+
+The best feasible grasp of each seed, planned from the real depth, executed on the true mesh where it was
+registered ([how](captures.md)): {successes} of {trials} succeed.
+
+| capture | object | success | failures | best probability | corrected by (mm) | mask needed |
+|---|---|---|---|---|---|---|
+"""
+
 
 @dataclass(frozen=True)
 class Options:
@@ -98,7 +108,23 @@ def main(options: Options) -> None:
         max_width=100 * rule["max_width"],
         min_height=100 * rule["min_height"],
     )
-    PAGE.write_text(head + "".join(row(name, seen) for name, seen in results["survey"].items()))
+    lines = [head, *(row(name, seen) for name, seen in results["survey"].items())]
+    lines.append(PHYSICS.format(**results["summary"]))
+    for name, objects in results["trials"].items():
+        lines += [trial_row(name, target, runs) for target, runs in objects.items()]
+    PAGE.write_text("".join(lines))
+
+
+def trial_row(name: str, target: str, runs: list[dict]) -> str:
+    """One line of the table of trials."""
+    lost = Counter(run["outcome"] for run in runs if not run["success"])
+    causes = ", ".join(f"{count} {outcome}" for outcome, count in lost.most_common())
+    predicted = [run["probability"] for run in runs if run["probability"] is not None]
+    probability = f"{np.median(predicted):.2f}" if predicted else "-"
+    moved = f"{1000 * np.median([run['moved'] for run in runs]):.0f}"
+    masked = "yes" if runs[0]["masked"] else "no"
+    won = f"{len(runs) - sum(lost.values())}/{len(runs)}"
+    return f"| {name} | {target} | {won} | {causes} | {probability} | {moved} | {masked} |\n"
 
 
 def row(name: str, seen: dict) -> str:
