@@ -2,8 +2,8 @@
 
     python benchmarks/noise.py --views 200 --json noise.json
 
-Each view is taken with every amount of noise from the same place. Where no object is found any more nothing is
-promised, which counts as 0. Leaves with status 1 where more noise than usual raised the mean by over 0.01.
+Each view is taken with every amount of noise from the same place. Where no object is found any more nothing
+is promised, which counts as 0. Leaves with status 1 where more noise than usual raised the mean by over 0.01.
 """
 
 from __future__ import annotations
