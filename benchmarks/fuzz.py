@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import logging
 import multiprocessing
+import os
 import resource
 import signal
 import sys
@@ -110,6 +111,8 @@ def work(name: str, place: Path, first: int, inputs: int) -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_SIZE, FILE_SIZE))
     folder = place / "input"
     folder.mkdir()
+    # MuJoCo writes a log of its warnings where it is.
+    os.chdir(place)
     door.build(folder)
     door.open(folder)
     before = peak_mb()

@@ -20,7 +20,10 @@ def door(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("input")
     request.param.build(folder)
     request.param.open(folder)
-    return request.param, folder
+    with pytest.MonkeyPatch.context() as patch:
+        # MuJoCo writes a log of its warnings where it is.
+        patch.chdir(folder)
+        yield request.param, folder
 
 
 @given(chance=st.randoms(use_true_random=False))
