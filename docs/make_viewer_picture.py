@@ -15,10 +15,10 @@ from ffhnet.apps.capture_options import NetworkOptions, load_network
 from ffhnet.apps.viewer.sight import Looker
 from ffhnet.apps.viewer.viewer import Viewer
 
-EXAMPLE = "detergent_2000001"
+EXAMPLE = "spray_flask_2000005"
 HANDS = 4
 PICTURE = Path(__file__).parent / "images" / "viewer.png"
-SCENE, PANEL, HEIGHT = 680, 320, 860  # pixels
+SCENE, PANEL, HEIGHT = 640, 320, 860  # pixels
 PATIENCE = 600_000  # ms: without a graphics processor a frame can take seconds
 ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
@@ -34,7 +34,7 @@ def main() -> None:
     options = NetworkOptions()
     network, hand = load_network(options)
     server = viser.ViserServer("127.0.0.1", 0, verbose=False)
-    viewer = Viewer(server, hand, Looker(network, options))
+    viewer = Viewer(server, hand, Looker(network, hand, options))
     viewer.panel.count.value = HANDS
     viewer.panel.example.value = EXAMPLE
     with sync_playwright() as driver:

@@ -50,7 +50,7 @@ def run(options: ViewOptions) -> None:
         from ffhnet.apps.viewer.viewer import Viewer
 
         network, hand = load_network(options)
-        looker = Looker(network, options)
+        looker = Looker(network, hand, options)
         sight = (
             looker.example(example_names()[-1])
             if options.input is None

@@ -9,8 +9,10 @@ import numpy as np
 from jaxtyping import Float
 
 from ffhnet.apps.capture_options import CaptureOptions, NetworkOptions, check_capture, observe_capture
+from ffhnet.feasibility.planner import Planner
 from ffhnet.geometry.transforms import apply, invert, make_transform
 from ffhnet.grasps import Grasps
+from ffhnet.hands import Hand
 from ffhnet.inference import FFHNet
 from ffhnet.objects.catalogue import resolve_objects
 from ffhnet.objects.grasp_object import GraspObject
@@ -39,6 +41,7 @@ class Sight:
         forward: horizontal direction of length 1 in which the camera looked, world frame.
         grasps: ranked, best first, in the world frame.
         in_input: the same grasps in the frame of the input, as `ffhnet grasp` gives them.
+        dropped: how many more were sampled that the hand cannot take up in the scene.
         known: the whole object, where it is an example.
     """
 
@@ -47,15 +50,16 @@ class Sight:
     forward: Float[np.ndarray, " 3"]
     grasps: Grasps
     in_input: Grasps
+    dropped: int = 0
     known: KnownObject | None = None
 
 
 class Looker:
     """Makes sights: one pair of networks and one way of sampling for all of them."""
 
-    def __init__(self, network: FFHNet, sampling: NetworkOptions) -> None:
+    def __init__(self, network: FFHNet, hand: Hand, sampling: NetworkOptions) -> None:
         """The threshold of `sampling` is not applied: the viewer has a slider for it."""
-        self._network = network
+        self._network, self._planner = network, Planner(network, hand)
         self._sampling = sampling
 
     def file(self, path: Path, capture: CaptureOptions) -> Sight:
@@ -82,13 +86,19 @@ class Looker:
         T_world_input: Float[np.ndarray, "4 4"],
         known: KnownObject | None = None,
     ) -> Sight:
-        in_input = self._network.grasp(observation, self._sampling.num, self._sampling.seed)
+        num, seed = self._sampling.num, self._sampling.seed
+        if observation.plane is None:
+            in_input, dropped = self._network.grasp(observation, num, seed), 0
+        else:
+            plan = self._planner.plan(observation, num, seed)
+            in_input, dropped = plan.grasps, len(plan.dropped)
         return Sight(
             title=title,
             cloud=apply(T_world_input, observation.cloud),
             forward=(T_world_input @ observation.T_input_view)[:3, 0],
             grasps=in_input.to_frame(T_world_input, "world"),
             in_input=in_input,
+            dropped=dropped,
             known=known,
         )
 

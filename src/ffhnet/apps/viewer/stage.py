@@ -22,8 +22,8 @@ from ffhnet.hands import Hand
 
 FIELD_OF_VIEW = np.radians(32.0)
 
-_FACES = 400
-"""Most faces of a link: dozens of hands are drawn at once, also by browsers without a graphics processor."""
+MAX_FACES = 1200
+"""Most faces of a link, so that dozens of hands are drawn at once; primitive shapes have fewer."""
 
 _AROUND = 0.2
 """m around an object that the camera sees: the hands stand there."""
@@ -197,8 +197,8 @@ def _place(handle: viser.MeshHandle, pose: Float[np.ndarray, "4 4"]) -> None:
 
 def _light(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     """A mesh of few faces, split at sharp edges so that boxes keep flat sides and capsules look round."""
-    if len(mesh.faces) > _FACES:
-        mesh = mesh.simplify_quadric_decimation(face_count=_FACES)
+    if len(mesh.faces) > MAX_FACES:
+        mesh = mesh.simplify_quadric_decimation(face_count=MAX_FACES)
     return mesh.smooth_shaded
 
 

@@ -68,8 +68,10 @@ class Viewer:
             self.stage.show_sight(sight)
             self.stage.frame_camera(sight)
             self._update_crowd()
-            points, grasps = len(sight.cloud), len(sight.grasps)
-            self.panel.status.content = note(f"{sight.title}: {points} points, {grasps} grasps sampled")
+            feasible, sampled = len(sight.grasps), len(sight.grasps) + sight.dropped
+            self.panel.status.content = note(
+                f"{sight.title}: {len(sight.cloud)} points; {feasible} of {sampled} grasps can be taken up"
+            )
 
     def try_to_show(self, look: Callable[[], Sight]) -> None:
         """Shows what `look` finds, or why it finds nothing; what was seen before then stays."""
