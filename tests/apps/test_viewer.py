@@ -1,5 +1,7 @@
 """The viewer behind the browser: files, sliders, choices, motions; no socket has to be listened to."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -140,6 +142,25 @@ def test_a_trial_is_played_as_it_ended(example):
     hit = record_trial(load_hand(), example.known, below)
     assert hit.outcome == Outcome.COLLISION
     assert all(frame.T_world_object is None for frame in hit.frames)
+
+
+def test_motions_are_played_until_something_else_is_chosen(viewer, monkeypatch):
+    pytest.importorskip("mujoco", reason="trials need the extra `sim`")
+    played = []
+    monkeypatch.setattr("ffhnet.apps.viewer.viewer.time", SimpleNamespace(sleep=played.append))
+    viewer.panel.grasp.value = viewer.panel.grasp.options[1]
+    viewer._close()
+    closing = len(played)
+    assert closing > 30
+    viewer._try()
+    assert len(played) - closing > closing
+    assert "held" in viewer.panel.outcome.content
+
+    away = SimpleNamespace(sleep=lambda _: viewer._choose(None))
+    monkeypatch.setattr("ffhnet.apps.viewer.viewer.time", away)
+    viewer._try()
+    assert viewer.panel.outcome.content == ""
+    assert viewer.stage.crowd_size == 5
 
 
 @pytest.mark.parametrize(

@@ -149,9 +149,8 @@ class Viewer:
             if index == self._chosen:
                 return
             self._chosen = index
-            self._motion += 1
+            self._begin_motion()
             panel = self.panel
-            panel.outcome.content = ""
             panel.close.disabled = index is None
             panel.trial.disabled = index is None or not self._can_try
             self.stage.hide_crowd(index is not None)
@@ -186,9 +185,9 @@ class Viewer:
                 return
             from ffhnet.apps.viewer.trial import describe, record_trial
 
-            self.panel.outcome.content = note("simulating ...")
             grasp, known = self._sight.grasps[self._chosen], self._sight.known
             motion = self._begin_motion()
+            self.panel.outcome.content = note("simulating ...")
             recording = record_trial(self._hand, known, grasp)
         self._play(recording.frames, motion)
         with self._lock:
@@ -197,6 +196,7 @@ class Viewer:
 
     def _begin_motion(self) -> int:
         """Ends whatever moves; the number that the new motion goes by."""
+        self.panel.outcome.content = ""
         self._motion += 1
         return self._motion
 
