@@ -207,7 +207,8 @@ def _message(path: Path) -> SimpleNamespace:
         if not all(isinstance(number, int) and 0 <= number < 2**32 for number in sizes):
             raise ValueError("a size is no uint32")
         data = bytes.fromhex(fields["data"])
-        return SimpleNamespace(**{**fields, "step": fields["row_step"], "fields": points, "data": data})
+        own = {"step": fields["row_step"], "fields": points, "data": data}
+        return SimpleNamespace(**{"encoding": "", **fields, **own})
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise MessageError(f"not even a message: {error}") from error
 
