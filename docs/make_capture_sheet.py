@@ -44,7 +44,8 @@ COLOURS = np.array(
     ]
 )
 TABLE, REST = np.array([205, 218, 205]), np.array([165, 165, 165])
-TILE, COLUMNS = (210, 158), 5
+TILE, COLUMNS = (210, 180), 5
+_ABOVE = 0.2
 
 TITLE = """# Every capture
 
@@ -180,6 +181,8 @@ class Canvas:
         ahead = apply(T, cloud)
         ahead = ahead[ahead[:, 2] > 0]
         low, high = np.percentile(ahead[:, :2] / ahead[:, 2:], [0.5, 99.5], axis=0)
+        # Hands come from above, where a view may end.
+        low[1] -= _ABOVE * (high[1] - low[1])
         return cls(T, low, float((np.array(TILE) / (high - low)).min()))
 
     def place(self, points: np.ndarray) -> np.ndarray:
