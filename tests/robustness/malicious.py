@@ -63,6 +63,14 @@ def huge_npz(name: str) -> bytes:
     return buffer.getvalue()
 
 
+def future_npz(name: str) -> bytes:
+    """An archive that asks for version 9.9 of the format."""
+    archive = bytearray(huge_npz(name))
+    place = archive.index(b"PK\x01\x02") + 6
+    archive[place : place + 2] = struct.pack("<H", 99)
+    return bytes(archive)
+
+
 def zip_bomb(name: str, size: int = 3 * 2**30) -> bytes:
     """An array of zeros that takes a thousandth of its size in the archive."""
     header = io.BytesIO()

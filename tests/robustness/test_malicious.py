@@ -32,6 +32,8 @@ EVIL = {
     "huge depth.npy": ("depth.npy", malicious.huge_npy),
     "huge cloud.npz": ("cloud.npz", lambda: malicious.huge_npz("cloud")),
     "huge grasps.npz": ("grasps.npz", lambda: malicious.huge_npz("palm_position")),
+    "future cloud.npz": ("cloud.npz", lambda: malicious.future_npz("cloud")),
+    "future grasps.npz": ("grasps.npz", lambda: malicious.future_npz("palm_position")),
     "bomb cloud.npz": ("cloud.npz", lambda: malicious.zip_bomb("cloud")),
     "bomb grasps.npz": ("grasps.npz", lambda: malicious.zip_bomb("palm_position")),
     "huge depth.png": ("depth.png", malicious.huge_png),
@@ -58,6 +60,7 @@ EVIL = {
 KNOWN = {
     "huge grasps.npz": f"{GRASPS}: MemoryError",
     "bomb grasps.npz": f"{GRASPS}: MemoryError at an array of any size",
+    "future grasps.npz": f"{GRASPS}: NotImplementedError",
     "deep grasps.json": f"{GRASPS}: RecursionError",
     "huge depth.png": f"{CAPTURES}: MemoryError outside what is guarded; images want a bound of pixels",
     "huge count in cloud.pcd": f"{CAPTURES}: pypcd4 loops over COUNT for hours",
