@@ -12,7 +12,7 @@ from PIL import Image
 from pypcd4 import PointCloud
 
 from ffhnet.apps import cli
-from ffhnet.perception.camera import REALSENSE_D415
+from ffhnet.perception.camera import REALSENSE_D415, look_at, render_depth
 from ffhnet.perception.capture import read_depth
 from ffhnet.perception.cloud import depth_to_cloud
 
@@ -33,7 +33,7 @@ QUICK = (
 
 def commands(page):
     """The `ffhnet` commands in a page's code blocks, as lists of words."""
-    text = page.read_text(encoding="utf-8")
+    text = page.read_text(encoding="utf-8").replace("FX FY CX CY", "615 615 320 240")
     for language, block in FENCE.findall(text):
         for line in block.replace("\\\n", " ").splitlines():
             if language == "" and line.startswith("ffhnet "):
@@ -59,15 +59,22 @@ def test_every_command_is_understood(command):
     cli._parse(list(command))
 
 
+def three_blocks():
+    """A depth image (m) of three things on a table."""
+    block = trimesh.creation.box((0.06, 0.06, 0.12))
+    blocks = [block.copy().apply_translation([0, side, 0.06]) for side in (-0.18, 0, 0.18)]
+    return render_depth(blocks, look_at([-0.6, 0, 0.5], [0, 0, 0.05]), REALSENSE_D415)
+
+
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
     """A folder with what the quick commands of the pages name."""
     folder = tmp_path_factory.mktemp("docs")
     example = ROOT / "examples" / "data" / "jar_2000004_depth.png"
     shutil.copytree(ROOT / "examples" / "data", folder / "examples" / "data")
-    shutil.copy(example, folder / "scene_depth.png")
     shutil.copytree(ROOT / "src" / "ffhnet" / "hands" / "dlr_hit_ii", folder / "my_hand")
     (folder / "data").symlink_to(ROOT / "data")
+    Image.fromarray(np.rint(1000 * three_blocks()).astype(np.uint16)).save(folder / "scene_depth.png")
     scene, _ = depth_to_cloud(read_depth(example), REALSENSE_D415)
     trimesh.PointCloud(scene).export(folder / "scene.ply")
     block = trimesh.creation.box((0.06, 0.06, 0.15)).sample(2000, seed=0)
