@@ -105,7 +105,9 @@ def test_pack_keeps_everything(data_set, tmp_path):
 def test_damaged_data_sets_are_named(tmp_path):
     with pytest.raises(DatasetError, match=r"dataset\.json"):
         read_training_data([tmp_path])
-    (tmp_path / "dataset.json").write_text(json.dumps({"format": 2, "hand": "x", "joint_names": [], "closes": []}))
+    (tmp_path / "dataset.json").write_text(
+        json.dumps({"format": 2, "hand": "x", "joint_names": [], "closes": []})
+    )
     with pytest.raises(DatasetError, match="holds no trials"):
         read_training_data([tmp_path])
     (tmp_path / "trials").mkdir()
