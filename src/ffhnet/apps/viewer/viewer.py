@@ -65,6 +65,8 @@ class Viewer:
         with self._lock:
             self._choose(None)
             self._sight = sight
+            if sight.known is None:
+                _select(self.panel.example, NO_EXAMPLE)
             self.stage.show_sight(sight)
             self.stage.frame_camera(sight)
             self._update_crowd()
@@ -72,6 +74,10 @@ class Viewer:
             self.panel.status.content = note(
                 f"{sight.title}: {len(sight.cloud)} points; {feasible} of {sampled} grasps can be taken up"
             )
+
+    def show_example(self, name: str) -> None:
+        """Shows one of `example_names()`."""
+        _select(self.panel.example, name)
 
     def try_to_show(self, look: Callable[[], Sight]) -> None:
         """Shows what `look` finds, or why it finds nothing; what was seen before then stays."""
@@ -156,15 +162,12 @@ class Viewer:
             self.stage.hide_crowd(index is not None)
             if self._sight is None or index is None:
                 panel.numbers.content = ""
-                self._set_label(NO_GRASP)
+                _select(panel.grasp, NO_GRASP)
                 self.stage.hide_frame()
                 return
-            self._set_label(grasp_label(self._sight.grasps, index))
+            _select(panel.grasp, grasp_label(self._sight.grasps, index))
             panel.numbers.content = grasp_numbers(self._sight.in_input[index])
             self.stage.show_frame(grasp_frame(self._sight.grasps[index]))
-
-    def _set_label(self, label: str) -> None:
-        self.panel.grasp.value = label  # type: ignore[misc]  # mypy does not see viser's setter
 
     @property
     def _can_try(self) -> bool:
@@ -208,3 +211,8 @@ class Viewer:
                     return
                 self.stage.show_frame(frame)
             time.sleep(1 / FRAMES_PER_SECOND)
+
+
+def _select(dropdown: viser.GuiDropdownHandle[str], option: str) -> None:
+    """Chooses as if a user did."""
+    dropdown.value = option  # type: ignore[misc]  # mypy does not see viser's setter
