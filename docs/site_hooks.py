@@ -1,6 +1,7 @@
 """Brings the pages into the site that lie beside what they describe, and points links at them.
 
 The cards of data and weights are read where data and weights are; the site shows them as pages of its own.
+Examples run where they lie; the site shows their source below the command that starts them.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ PAGES = {
 }
 """Places in the repository, and the pages of the site that show them."""
 
+_STARTS_EXAMPLE = re.compile(r"^```\npython (examples/\S+)\n```\n", re.MULTILINE)
+
 _LINK = re.compile(r"(?<=\]\()([^)#\s]+)")
 
 
@@ -33,9 +36,13 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Points links that leave docs/ at the pages that show what they mean."""
+    """Shows examples, and points links that leave docs/ at the pages that show what they mean."""
     if page.file.src_uri in PAGES.values():
         return markdown
+    root = Path(config.config_file_path).parent
+    markdown = _STARTS_EXAMPLE.sub(
+        lambda start: f"{start[0]}\n```python\n{(root / start[1]).read_text(encoding='utf-8')}```\n", markdown
+    )
     return _relinked(markdown, posixpath.join("docs", posixpath.dirname(page.file.src_uri)))
 
 

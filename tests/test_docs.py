@@ -53,6 +53,12 @@ def test_pages_show_commands():
     assert any(command[0] == "grasp" for command in SHOWN)
 
 
+def test_page_of_examples_shows_all():
+    """They run in test_examples.py."""
+    shown = re.findall(r"^python (examples/\S+)$", (ROOT / "docs/examples.md").read_text(), re.MULTILINE)
+    assert shown == [path.relative_to(ROOT).as_posix() for path in sorted(ROOT.glob("examples/[0-9]*.py"))]
+
+
 @pytest.mark.parametrize("command", SHOWN, ids=names)
 def test_every_command_is_understood(command):
     """Its options exist and fit; whether its files do, the commands say when they run."""
@@ -107,3 +113,4 @@ def test_site_builds_without_a_warning(tmp_path, caplog):
     reference = (tmp_path / "reference" / "inference" / "index.html").read_text(encoding="utf-8")
     assert "from_pretrained" in reference
     assert (tmp_path / "data-card" / "index.html").is_file()
+    assert "GraspTracker" in (tmp_path / "examples" / "index.html").read_text(encoding="utf-8")
