@@ -1,4 +1,4 @@
-"""Writing files whole or not at all, and folders by one process at a time."""
+"""Reading files of others, writing files whole or not at all, and folders by one process at a time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,29 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
-from ffhnet.errors import OptionError
+from ffhnet.errors import FFHNetError, InputFileError, OptionError
+
+
+@contextlib.contextmanager
+def reading(path: Path, what: str) -> Iterator[None]:
+    """Whatever trips over the content of a file inside becomes one line about the file.
+
+    The readers of foreign formats raise what they like, a MemoryError or RecursionError among it.
+
+    Raises:
+        InputFileError: anything but an error of this package was raised.
+    """
+    try:
+        yield
+    except FFHNetError:
+        raise
+    except FileNotFoundError:
+        raise InputFileError(f"{path}: no such file") from None
+    except Exception as error:
+        first_line = (str(error).splitlines() or [""])[0]
+        raise InputFileError(
+            f"{path}: not {what}, or damaged ({type(error).__name__}: {first_line})"
+        ) from error
 
 
 def check_output(path: Path, suffixes: tuple[str, ...]) -> None:

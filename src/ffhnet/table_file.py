@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ffhnet.array_files import check_arrays, check_size
 from ffhnet.errors import InputFileError
-from ffhnet.files import check_output, write_atomically
+from ffhnet.files import check_output, reading, write_atomically
 
 SUFFIXES = (".json", ".npz")
 
@@ -50,12 +50,9 @@ def read_tables(path: str | Path, tables: tuple[str, ...]) -> Fields:
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise InputFileError(f"{path}: a grasp file must end in {' or '.join(SUFFIXES)}, got '{path.suffix}'")
-    try:
+    with reading(path, "a grasp file"):
+        check_size(path)
         return _read_json(path, tables) if path.suffix.lower() == ".json" else _read_npz(path)
-    except FileNotFoundError:
-        raise InputFileError(f"{path}: no such file") from None
-    except (OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, zipfile.BadZipFile) as error:
-        raise InputFileError(f"{path}: not a grasp file ({type(error).__name__}: {error})") from error
 
 
 def _names(tables: tuple[str, ...]) -> dict[str, str]:
@@ -132,5 +129,6 @@ def _filled(values: list[Any]) -> np.ndarray:
 
 
 def _read_npz(path: Path) -> Fields:
+    check_arrays(path)
     with np.load(path, allow_pickle=False) as arrays:
         return {name: arrays[name] for name in arrays.files}

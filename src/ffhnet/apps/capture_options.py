@@ -23,9 +23,6 @@ INPUT_HELP = (
     "frame: x right, y down, z forward. With one of the two a cloud is a single object, already cut out."
 )
 
-_MAX_PIXELS = 2**26
-"""Pixels of a mask; larger images are written to fill the memory."""
-
 Vector = Annotated[tuple[float, float, float] | None, absent("X Y Z")]
 File = Annotated[Path | None, absent("FILE")]
 
@@ -106,6 +103,7 @@ def observe_capture(path: Path, options: CaptureOptions, rng: np.random.Generato
     import numpy as np
 
     from ffhnet.perception.capture import read_cloud
+    from ffhnet.perception.cloud import validate_object
     from ffhnet.perception.observation import observe_depth, observe_object, observe_scene
 
     if _is_depth(path, options):
@@ -115,6 +113,7 @@ def observe_capture(path: Path, options: CaptureOptions, rng: np.random.Generato
     cloud = read_cloud(path)
     if options.up is None and not options.world:
         return observe_scene(cloud, rng, object_index=options.object)
+    cloud = validate_object(cloud)
     up = np.array([0.0, 0.0, 1.0]) if options.up is None else np.array(options.up)
     direction = None if options.camera is None else cloud.mean(axis=0) - np.array(options.camera)
     frame = "world" if options.world else "camera"
@@ -153,15 +152,10 @@ def _read_mask(path: Path) -> np.ndarray:
     import numpy as np
     from PIL import Image
 
-    from ffhnet.errors import InputFileError
+    from ffhnet.files import reading
+    from ffhnet.perception.capture import check_pixels
 
-    try:
-        with Image.open(path) as image:
-            if image.width * image.height > _MAX_PIXELS:
-                raise ValueError(f"{image.width} x {image.height} pixels are more than any camera has")
-            pixels = np.asarray(image)
-    except FileNotFoundError:
-        raise InputFileError(f"{path}: no such file") from None
-    except (OSError, SyntaxError, ValueError, MemoryError, Image.DecompressionBombError) as error:
-        raise InputFileError(f"{path}: not a mask image, or damaged ({error})") from error
+    with reading(path, "a mask image"), Image.open(path) as image:
+        check_pixels(path, image.width * image.height)
+        pixels = np.asarray(image)
     return pixels != 0 if pixels.ndim == 2 else (pixels[..., :3] != 0).any(axis=-1)

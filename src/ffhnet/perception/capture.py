@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
@@ -10,7 +9,9 @@ import numpy as np
 from jaxtyping import Float
 from PIL import Image
 
+from ffhnet.array_files import MAX_BYTES, check_arrays, check_size
 from ffhnet.errors import CloudError, InputFileError
+from ffhnet.files import reading
 from ffhnet.perception.cloud import validate_cloud
 
 CLOUD_TYPES = (".ply", ".pcd", ".npy", ".npz")
@@ -24,6 +25,12 @@ _MAX_COLUMNS = 16
 
 _MAX_DEPTH = 20.0
 """m: no depth camera for tables reaches further; millimetres given as metres do."""
+
+_MAX_PIXELS = 2**24
+"""Of an image: 4096 x 4096. Larger ones are written to fill the memory."""
+
+_MAX_COUNT = 4096
+"""Numbers of one point of a PCD: descriptors have hundreds."""
 
 
 def read_cloud(path: str | Path) -> Float[np.ndarray, "N 3"]:
@@ -39,13 +46,15 @@ def read_cloud(path: str | Path) -> Float[np.ndarray, "N 3"]:
     path = _existing(path, CLOUD_TYPES, "a point cloud")
     suffix = path.suffix.lower()
     if suffix in (".npy", ".npz"):
-        points = _read_array(path, _CLOUD_KEYS)
+        with reading(path, "a NumPy file"):
+            points = _read_array(path, _CLOUD_KEYS)
         if points.ndim == 2 and points.shape[1] > _MAX_COLUMNS:
             raise InputFileError(
                 f"{path}: wanted points of shape (N, 3), got {points.shape}: a depth image wants intrinsics"
             )
     else:
-        points = _guarded(path, "a point cloud", _read_ply if suffix == ".ply" else _read_pcd)
+        with reading(path, "a point cloud"):
+            points = _read_ply(path) if suffix == ".ply" else _read_pcd(path)
     try:
         return validate_cloud(points)
     except CloudError as error:
@@ -63,11 +72,9 @@ def read_depth(path: str | Path, depth_scale: float | None = None) -> Float[np.n
         InputFileError: the file is missing, damaged, not a depth image, or without any reading.
     """
     path = _existing(path, DEPTH_TYPES, "a depth image")
-    raw = (
-        _guarded(path, "a PNG image", _read_png)
-        if path.suffix.lower() == ".png"
-        else _read_array(path, _DEPTH_KEYS)
-    )
+    with reading(path, "a depth image"):
+        raw = _read_png(path) if path.suffix.lower() == ".png" else _read_array(path, _DEPTH_KEYS)
+    check_pixels(path, raw.size)
     if raw.ndim == 3 and raw.shape[2] == 1:
         raw = raw[:, :, 0]
     if raw.ndim != 2 or raw.shape[1] <= _MAX_COLUMNS:
@@ -94,6 +101,12 @@ def read_depth(path: str | Path, depth_scale: float | None = None) -> Float[np.n
     return depth
 
 
+def check_pixels(path: Path, pixels: int) -> None:
+    """Raises InputFileError where an image has more pixels than a depth camera."""
+    if pixels > _MAX_PIXELS:
+        raise InputFileError(f"{path}: wanted an image of at most {_MAX_PIXELS} pixels, got {pixels}")
+
+
 def _existing(path: str | Path, types: tuple[str, ...], what: str) -> Path:
     """The path, if there is a file of a known type that is not empty."""
     path = Path(path)
@@ -103,20 +116,8 @@ def _existing(path: str | Path, types: tuple[str, ...], what: str) -> Path:
         raise InputFileError(f"{path}: {what} must be one of {', '.join(types)}, got '{path.suffix}'")
     if path.stat().st_size == 0:
         raise InputFileError(f"{path}: the file is empty")
+    check_size(path)
     return path
-
-
-def _guarded(path: Path, what: str, read: Callable[[Path], np.ndarray]) -> np.ndarray:
-    """The array that `read` returns; whatever it trips over becomes one line about the file."""
-    try:
-        return read(path)
-    except InputFileError:
-        raise
-    except Exception as error:
-        first_line = (str(error).splitlines() or [""])[0]
-        raise InputFileError(
-            f"{path}: not {what}, or damaged ({type(error).__name__}: {first_line})"
-        ) from error
 
 
 def _read_ply(path: Path) -> np.ndarray:
@@ -149,15 +150,32 @@ def _complete(path: Path, points: np.ndarray, promised: int) -> np.ndarray:
 
 
 def _read_pcd(path: Path) -> np.ndarray:
-    from pypcd4 import PointCloud  # here, because it takes long
+    from pypcd4 import MetaData, PointCloud  # here, because it takes long
 
-    cloud = PointCloud.from_path(path)
+    with path.open("rb") as file:
+        header = MetaData.parse_header(_pcd_header(file))
+        # The library makes a column for each number of a point, in a loop, before it reads any.
+        row = sum(header.count)
+        if row > _MAX_COUNT or row * header.points > MAX_BYTES:
+            raise InputFileError(f"{path}: {header.points} points of {row} numbers are too many for a cloud")
+        file.seek(0)
+        cloud = PointCloud.from_fileobj(file)
     missing = {"x", "y", "z"} - set(cloud.fields)
     if missing:
         raise InputFileError(
             f"{path}: a cloud must have the fields x, y and z, got {', '.join(cloud.fields)}"
         )
     return _complete(path, cloud.numpy(("x", "y", "z")), cloud.metadata.points)
+
+
+def _pcd_header(file: BinaryIO) -> list[str]:
+    """The lines of a PCD up to the one that says how its data are written."""
+    lines: list[str] = []
+    for line in file:
+        lines.append(line.decode().strip())
+        if lines[-1].startswith("DATA"):
+            break
+    return lines
 
 
 def _read_png(path: Path) -> np.ndarray:
@@ -170,23 +188,21 @@ def _read_png(path: Path) -> np.ndarray:
                 f"{path}: a depth image must have one channel of 16 bits, "
                 f"got 8 bits per channel (mode '{image.mode}')"
             )
+        check_pixels(path, image.width * image.height)
         return np.asarray(image)
 
 
 def _read_array(path: Path, keys: tuple[str, ...]) -> np.ndarray:
     """The array of an `.npy` file, or of an `.npz` file under one of the keys; never unpickles."""
 
-    def load(path: Path) -> np.ndarray:
-        loaded = np.load(path, allow_pickle=False)
-        if isinstance(loaded, np.ndarray):
-            return loaded
-        with loaded:
-            names = loaded.files
-            known = [key for key in keys if key in names] or (names if len(names) == 1 else [])
-            if not known:
-                raise InputFileError(
-                    f"{path}: wanted an array named {' or '.join(keys)}, got {', '.join(names)}"
-                )
-            return loaded[known[0]]
-
-    return _guarded(path, "a NumPy file", load)
+    if path.suffix.lower() == ".npz":
+        check_arrays(path)
+    loaded = np.load(path, allow_pickle=False)
+    if isinstance(loaded, np.ndarray):
+        return loaded
+    with loaded:
+        names = loaded.files
+        known = [key for key in keys if key in names] or (names if len(names) == 1 else [])
+        if not known:
+            raise InputFileError(f"{path}: wanted an array named {' or '.join(keys)}, got {', '.join(names)}")
+        return loaded[known[0]]

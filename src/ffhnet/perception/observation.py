@@ -11,7 +11,7 @@ from ffhnet.errors import CloudError, OptionError, SceneError
 from ffhnet.geometry.transforms import apply, invert
 from ffhnet.perception.bps import encode
 from ffhnet.perception.camera import Intrinsics
-from ffhnet.perception.cloud import MIN_POINTS, depth_to_cloud, finite_rows, validate_cloud
+from ffhnet.perception.cloud import MIN_POINTS, depth_to_cloud, finite_rows, validate_cloud, validate_object
 from ffhnet.perception.segment import MIN_HEIGHT, segment_objects
 from ffhnet.perception.table import Plane, fit_table
 from ffhnet.perception.view_frame import unit, view_frame
@@ -76,7 +76,7 @@ def observe_object(
     """An object that was already cut out of its scene.
 
     Args:
-        cloud: the object's visible points (m).
+        cloud: the object's visible points (m); strays are dropped (`validate_object`).
         up: direction against gravity in the cloud's frame.
         frame: name of that frame, "camera" or "world".
         viewing_direction: from the camera to the object. If none: in the camera frame the direction to
@@ -87,10 +87,10 @@ def observe_object(
             15 mm too high; pass the height where it is known.
 
     Raises:
-        CloudError: the cloud cannot be used (`validate_cloud`).
+        CloudError: the cloud cannot be used (`validate_object`).
         OptionError: a direction is not usable, or the table is above the cloud's mean.
     """
-    cloud = validate_cloud(cloud)
+    cloud = validate_object(cloud)
     up = unit(up, "up direction")
     if viewing_direction is None:
         viewing_direction = _guess_viewing_direction(cloud, frame)

@@ -11,7 +11,7 @@ from ffhnet.geometry.rotations import matrix_from_quaternion
 from ffhnet.geometry.transforms import make_transform
 from ffhnet.grasps import Grasps
 from ffhnet.inference import FFHNet
-from ffhnet.perception.cloud import validate_cloud
+from ffhnet.perception.cloud import validate_object
 from ffhnet.perception.observation import Observation, observe_object, observe_scene
 
 
@@ -69,6 +69,6 @@ def _observe(cloud: Float[np.ndarray, "N 3"], is_scene: bool, options: RosOption
         return observe_scene(cloud, np.random.default_rng(options.seed), options.object)
     if is_scene:
         raise OptionError("up is for clouds of one object; a depth image shows a whole scene")
-    cloud = validate_cloud(cloud)
+    cloud = validate_object(cloud)
     direction = cloud.mean(axis=0) - np.array(options.camera) if options.camera else None
     return observe_object(cloud, np.array(options.up), "camera", viewing_direction=direction)
