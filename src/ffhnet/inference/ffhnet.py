@@ -13,6 +13,7 @@ from jaxtyping import Float
 from ffhnet.errors import HandError, OptionError, WeightsError
 from ffhnet.geometry.transforms import invert
 from ffhnet.grasps import Grasps
+from ffhnet.inference import hub
 from ffhnet.inference.engine import Engine, SeenObject
 from ffhnet.inference.risk import RiskControl
 from ffhnet.inference.weights_calibration import WeightsCalibration, load_calibration
@@ -56,16 +57,16 @@ class FFHNet:
         hand: str | None = None,
         device: torch.device | str | None = None,
     ) -> FFHNet:
-        """Load a checkpoint folder.
+        """Load trained weights.
 
         Args:
-            path_or_name: a folder, the name of weights that ship with the package, or None for the
-                package's own weights.
+            path_or_name: as in `find_weights`; None takes the package's own.
             hand: name of the hand that the weights must be for; None takes any.
             device: None takes CUDA where there is one, else the CPU.
 
         Raises:
             WeightsError: missing or damaged weights, or those of another hand.
+            MissingExtraError: weights of a model hub without the extra `hub`.
         """
         if device is None:
             device = "cuda" if torch.cuda.is_available() else "cpu"
@@ -186,14 +187,22 @@ def shipped_weights() -> Path:
 
 
 def find_weights(path_or_name: str | Path | None) -> Path:
-    """The folder of weights that a user names: a path, shipped weights by name, or the default for None.
+    """The folder of weights that a user names.
+
+    Args:
+        path_or_name: a folder; else the name of weights that ship with the package; else a repository of a
+            model hub, "org/name" or "org/name@revision" (`hub.py`). None takes the package's own.
 
     Raises:
         WeightsError: there is none.
+        MissingExtraError: it can only be a repository, and the extra `hub` is not installed.
     """
     if path_or_name is None:
         return shipped_weights()
     for folder in (Path(path_or_name), shipped_weights() / path_or_name):
         if folder.is_dir():
             return folder
-    raise WeightsError(f"no folder and no shipped weights of the name {str(path_or_name)!r}")
+    name = Path(path_or_name).as_posix()
+    if hub.is_repository(name):
+        return hub.download(name)
+    raise WeightsError(f"no folder and no shipped weights of the name {name!r}")
