@@ -9,9 +9,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-# pip says much; of it, what is being fetched and installed shows the progress.
-PIP_INSTALL := $(BIN)/python -m pip install --disable-pip-version-check -c constraints.txt
-PROGRESS := awk '/^ *Downloading|^Building|^Installing|^Successfully installed/ { print substr($$0, 1, 100); fflush() }'
+# pip says much; of it, what is being looked up, fetched and installed shows the progress, line by line.
+PIP_INSTALL := $(BIN)/python -u -m pip install --disable-pip-version-check -c constraints.txt
+PROGRESS := awk '/^ *(Collecting|Downloading)|^Building|^Installing|^Successfully installed/ { print substr($$0, 1, 100); fflush() }'
 
 .PHONY: help
 help:

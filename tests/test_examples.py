@@ -1,4 +1,4 @@
-"""Every numbered example is short, says how it is started, and runs."""
+"""Every numbered example is short, says how it is started, and runs; the notebook draws its pictures."""
 
 import ast
 import runpy
@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("[0-9][0-9]_*.py"))
+FOLDER = Path(__file__).parents[1] / "examples"
+EXAMPLES = sorted(FOLDER.glob("[0-9][0-9]_*.py"))
 LONGEST = 60
 
 
@@ -28,3 +29,18 @@ def test_example_runs(path, capsys, monkeypatch):
     monkeypatch.setattr("sys.argv", [str(path)])
     runpy.run_path(str(path), run_name="__main__")
     assert len(capsys.readouterr().out.splitlines()) >= 5
+
+
+def test_notebook_draws_its_pictures():
+    nbclient = pytest.importorskip("nbclient", reason="running the notebook needs the extra `dev`")
+    nbformat = pytest.importorskip("nbformat", reason="running the notebook needs the extra `dev`")
+    pytest.importorskip("ipykernel", reason="running the notebook needs the extra `dev`")
+    notebook = nbformat.read(FOLDER / "pictures.ipynb", as_version=4)
+    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    assert not any(cell.outputs or cell.execution_count for cell in code), "stored without outputs"
+    nbclient.NotebookClient(
+        notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(FOLDER)}}
+    ).execute()
+    kinds = [kind for cell in code for output in cell.outputs for kind in output.get("data", ())]
+    assert kinds.count("image/png") == 4
+    assert kinds.count("text/html") == 2
