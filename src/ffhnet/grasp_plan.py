@@ -61,6 +61,7 @@ class GraspPlan:
         arm: how the arm does them, or None where none was asked for.
         dropped: the grasps that cannot be done, best first.
         reasons: why, one word for each.
+        novelty: how unlike all that the networks know the object is (`FFHNet.novelty`), None if not known.
     """
 
     grasps: Grasps
@@ -72,6 +73,7 @@ class GraspPlan:
     arm: ArmMotion | None
     dropped: Grasps
     reasons: tuple[str, ...]
+    novelty: float | None = None
 
     @classmethod
     def of(

@@ -63,6 +63,8 @@ def save_plan(plan: GraspPlan, path: str | Path) -> None:
         "torque_limits": plan.torque_limit,
         "target_lead": plan.lead,
     }
+    if plan.novelty is not None:
+        header["novelty"] = plan.novelty
     if plan.arm is not None:
         T = plan.arm.T_frame_base
         columns |= {
@@ -152,6 +154,7 @@ def _plan(fields: Fields) -> GraspPlan:
         arm=_arm(fields) if "arm" in fields else None,
         dropped=dropped,
         reasons=tuple(str(reason) for reason in reasons),
+        novelty=float(fields["novelty"]) if "novelty" in fields else None,
     )
 
 

@@ -31,6 +31,7 @@ from ffhnet.grasps_file import load_grasps, save_grasps
 from ffhnet.hands import load_hand
 from ffhnet.inference import FFHNet
 from ffhnet.inference.calibration import Calibration
+from ffhnet.inference.novelty import NoveltyLimit
 from ffhnet.inference.risk import RiskTable
 from ffhnet.inference.weights_calibration import WeightsCalibration, save_calibration
 from ffhnet.model import CheckpointInfo, FFHEvaluator, FlowGenerator, ModelConfig, save_checkpoint
@@ -146,7 +147,8 @@ def _save_calibrated_weights(folder: Path) -> None:
     _save_weights(folder)
     maps = Calibration(2.0, 2.0, -1.0)
     table = RiskTable(np.arange(20) // 2, np.full(20, 0.9), np.ones(20))
-    save_calibration(folder, WeightsCalibration(maps, maps, table, "made up"))
+    limit = NoveltyLimit(2.0, 0.01, 500)
+    save_calibration(folder, WeightsCalibration(maps, maps, table, "made up", limit))
 
 
 def _save_data_set(folder: Path) -> None:

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 class CalibrateOptions:
     """Try the generator's own grasps on unseen objects, and write what was learned beside the weights.
 
+    All views also say how unlike the training views an object may look before `ffhnet grasp` warns.
+
     Random ones of the objects fit the maps of the probabilities; the others, unseen by the maps, are
     the record from which `ffhnet grasp --max-failure` picks its threshold.
     """
@@ -55,6 +57,7 @@ def run(options: CalibrateOptions) -> None:
     from ffhnet.dataset.executors import run_jobs
     from ffhnet.evaluation.own_samples import OwnSamplesJob, try_own_samples
     from ffhnet.inference.calibration import fit_calibration
+    from ffhnet.inference.novelty import NoveltyLimit
     from ffhnet.inference.risk import RiskTable
     from ffhnet.inference.weights_calibration import WeightsCalibration, save_calibration
     from ffhnet.model.checkpoint import load_checkpoint
@@ -95,8 +98,10 @@ def run(options: CalibrateOptions) -> None:
         f"{options.objects} without the first {options.first}: {options.fit} objects for the maps, "
         f"{len(found) - options.fit} for the risk; {options.views} views, seed {options.seed}"
     )
+    strange = np.array([view.novelty for view in fitting + record])
+    limit = None if np.isnan(strange).any() else NoveltyLimit.of(strange)
     calibration = WeightsCalibration(
-        nominal.calibration, None if varied is None else varied.calibration, table, source
+        nominal.calibration, None if varied is None else varied.calibration, table, source, limit
     )
     save_calibration(options.weights, calibration)
     rows = []
@@ -111,6 +116,9 @@ def run(options: CalibrateOptions) -> None:
         ("probability of", "tried", "held", "map", "ECE before", "after"),
         rows,
     )
+    if limit is not None:
+        rate = f"{limit.false_alarms:.1%} of views of unseen objects, by {limit.views} of them"
+        print(f"novelty above {limit.limit:.3g} is called novel: {rate}")
     for risk in (0.2, 0.1, 0.05, 0.02):
         control = table.control(risk)
         if control.threshold is None:

@@ -21,7 +21,7 @@ from ffhnet.apps.capture_options import (
 )
 from ffhnet.apps.console import absent, busy, print_table
 from ffhnet.apps.extras import require_arm
-from ffhnet.errors import OptionError
+from ffhnet.errors import OptionError, WeightsError
 
 if TYPE_CHECKING:
     from ffhnet.grasp_plan import GraspPlan
@@ -49,6 +49,8 @@ class GraspOptions(NetworkOptions, CaptureOptions):
     the camera, above the table; for a cloud with --world in its frame, but above the table."""
     max_failure: Annotated[float | None, absent("P")] = None
     """Abstain where the best grasp cannot be promised to fail at most this often, with 95 % confidence."""
+    refuse_novel: bool = False
+    """Abstain from an object unlike all that the networks were trained on, instead of only saying so."""
     out: File = None
     """Write all grasps to this .json or .npz, best first, in the frame of the input."""
     plot: File = None
@@ -98,6 +100,7 @@ def _grasp_one(options: GraspOptions, observation: Observation, network: FFHNet,
 
     with busy("sampling, checking and ranking grasps"):
         plan = _plan(options, observation, network, hand)
+    plan, warning = _judge_novelty(plan, observation, network, options.refuse_novel)
     message = _summary(plan)
     if options.max_failure is not None and len(plan.grasps):
         refusal = network.control_risk(options.max_failure).refusal(plan.grasps.score)
@@ -117,10 +120,28 @@ def _grasp_one(options: GraspOptions, observation: Observation, network: FFHNet,
     if len(plan.grasps):
         _show(plan.grasps, hand)
     print(message)
+    if warning is not None:
+        print(warning)
     if options.out is not None:
         print(f"{len(plan.grasps)} grasps written to {options.out}")
     if plot is not None:
         print(f"picture written to {plot}")
+
+
+def _judge_novelty(
+    plan: GraspPlan, observation: Observation, network: FFHNet, refuse: bool
+) -> tuple[GraspPlan, str | None]:
+    """The plan with the object's novelty, without grasps where that is refused, and a line that says so."""
+    limit = None if network.calibration is None else network.calibration.novelty
+    relative = network.novelty(observation)
+    if limit is None or relative is None:
+        if refuse:
+            raise WeightsError("these weights do not know what is novel to them: run `ffhnet calibrate`")
+        return plan, None
+    plan, warning = dataclasses.replace(plan, novelty=relative), limit.warning(relative)
+    if warning is not None and refuse:
+        return plan.refused("novelty"), f"abstained: {warning}"
+    return plan, warning
 
 
 def _check_robot(options: GraspOptions) -> None:

@@ -14,6 +14,7 @@ from jaxtyping import Float
 from ffhnet.errors import SceneError
 from ffhnet.hands import load_hand
 from ffhnet.inference.ffhnet import FFHNet
+from ffhnet.inference.novelty import novelty
 from ffhnet.model.checkpoint import load_checkpoint
 from ffhnet.objects.catalogue import ObjectSource
 from ffhnet.simulation.scene import build_scene
@@ -54,6 +55,7 @@ class OwnSamples:
         held: in one repeat under varied pose, mass and friction.
         top_score: score of the best of all samples.
         top_held: success of one repeat of it under varied physics.
+        novelty: how unlike the training views this one is; NaN where the networks cannot tell.
     """
 
     object_name: str
@@ -63,6 +65,7 @@ class OwnSamples:
     held: Float[np.ndarray, " N"]
     top_score: float
     top_held: float
+    novelty: float
 
 
 def try_own_samples(job: OwnSamplesJob) -> list[OwnSamples]:
@@ -81,6 +84,7 @@ def try_own_samples(job: OwnSamplesJob) -> list[OwnSamples]:
             continue
         ranked = network.grasp(view.observation, job.samples, seed=int(rng.integers(2**31)))
         ranked = ranked.to_frame(view.T_world_camera, "world")
+        strange = novelty(network.evaluator.condition, view.observation.bps)
         drawn = ranked[rng.permutation(len(ranked))[: job.executed]]
         assert drawn.probability is not None
         found.append(
@@ -92,6 +96,7 @@ def try_own_samples(job: OwnSamplesJob) -> list[OwnSamples]:
                 held=held_under_variation(trial, drawn, T_world_object, 1, rng).astype(float),
                 top_score=float(ranked.score[0]),
                 top_held=float(held_under_variation(trial, ranked[0], T_world_object, 1, rng)[0]),
+                novelty=np.nan if strange is None else strange,
             )
         )
     return found

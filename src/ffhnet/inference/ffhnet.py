@@ -15,6 +15,7 @@ from ffhnet.geometry.transforms import invert
 from ffhnet.grasps import Grasps
 from ffhnet.inference import hub
 from ffhnet.inference.engine import Engine, SeenObject
+from ffhnet.inference.novelty import novelty
 from ffhnet.inference.risk import RiskControl
 from ffhnet.inference.weights_calibration import WeightsCalibration, load_calibration
 from ffhnet.model.checkpoint import Checkpoint, CheckpointInfo, load_checkpoint
@@ -138,6 +139,17 @@ class FFHNet:
         if self.calibration is None:
             raise WeightsError("a risk can only be chosen with calibrated weights: run `ffhnet calibrate`")
         return self.calibration.risk.control(max_failure, confidence)
+
+    def novelty(self, observation: Observation) -> float | None:
+        """How unlike all that the networks were trained on an object looks: above 1 its grasps mean nothing.
+
+        Returns:
+            In units of the limit that few views of wanted objects pass (`novelty.py`); None where the weights
+            were not calibrated for it.
+        """
+        limit = None if self.calibration is None else self.calibration.novelty
+        distance = novelty(self.evaluator.condition, observation.bps)
+        return None if limit is None or distance is None else distance / limit.limit
 
     def _sample(self, seen: SeenObject, num: int, source: torch.Generator) -> Grasps:
         if num < 1:
