@@ -128,8 +128,8 @@ def test_eigengrasps_reach_published_extremes(hand):
 
 
 def test_unknown_hand_and_broken_description(tmp_path):
-    with pytest.raises(HandError, match="unknown hand 'shadow'"):
-        load_hand("shadow")
+    with pytest.raises(HandError, match="unknown hand 'claw'"):
+        load_hand("claw")
     broken = tmp_path / "hand.toml"
     broken.write_text("name = 'x'\njoint_order = ['a']\n")
     with pytest.raises(HandError, match="missing or malformed"):

@@ -12,6 +12,7 @@ import tyro
 
 from ffhnet.apps.console import absent, print_table, progress_bar
 from ffhnet.apps.extras import require_sim
+from ffhnet.apps.hand_option import for_workers
 from ffhnet.errors import DatasetError, OptionError
 
 if TYPE_CHECKING:
@@ -38,6 +39,8 @@ class GenerateOptions:
     """Number of objects, at most."""
     first: int = 0
     """Leave out this many objects before; for fresh objects in later rounds."""
+    hand: Annotated[str | None, absent("HAND", "dlr_hit_ii")] = None
+    """Name or TOML file of the hand."""
     seed: int = 0
     """Seed of all randomness, together with the object's own."""
     placements: int = 2
@@ -73,13 +76,15 @@ def run(options: GenerateOptions) -> None:
         raise OptionError("--repeated-share must lie between 0 and 1, --repeats between 1 and 100")
     executor = _executor(options)
     sources = _sources(options)
-    weights = _checked_weights(options)
+    hand = _checked_hand(options)
+    weights = _checked_weights(options, hand)
     # After the options are checked: these load MuJoCo and torch.
     from ffhnet.dataset.generate import generate, unfinished
     from ffhnet.dataset.object_trials import GenerateConfig
     from ffhnet.dataset.statistics import summarise
 
     config = GenerateConfig(
+        hand=hand,
         seed=options.seed,
         placements=options.placements,
         views=options.views,
@@ -140,15 +145,22 @@ def _sources(options: GenerateOptions) -> list[ObjectSource]:
     return sources
 
 
-def _checked_weights(options: GenerateOptions) -> str | None:
+def _checked_hand(options: GenerateOptions) -> str:
+    """The hand as workers find it, read here once rather than by every object."""
+    from ffhnet.hands import DEFAULT_HAND
+
+    return for_workers(DEFAULT_HAND if options.hand is None else options.hand)
+
+
+def _checked_weights(options: GenerateOptions, hand: str) -> str | None:
     """The folder of weights, tried here once rather than by every object."""
     if (options.weights is None) != (options.learned == 0):
         raise OptionError("--weights and --learned go together: give both, or neither")
     if options.weights is None:
         return None
-    from ffhnet.hands import DEFAULT_HAND
+    from ffhnet.hands import load_hand
     from ffhnet.inference.ffhnet import FFHNet, find_weights
 
     folder = find_weights(options.weights)
-    FFHNet.from_pretrained(folder, hand=DEFAULT_HAND, device="cpu")
+    FFHNet.from_pretrained(folder, hand=load_hand(hand).name, device="cpu")
     return str(folder)

@@ -85,7 +85,7 @@ def _compare_with_mujoco(hand: Hand) -> bool:
     import torch
 
     try:
-        model = mujoco.MjModel.from_xml_path(str(hand.mjcf))
+        model = hand.spec().compile()
     except ValueError as error:
         raise HandError(f"MuJoCo cannot read {hand.mjcf.name}: {error}") from error
     joints = hand.lower + 0.4 * (hand.upper - hand.lower)

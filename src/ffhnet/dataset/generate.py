@@ -96,7 +96,7 @@ def _header(config: GenerateConfig) -> dict[str, Any]:
         "hand": hand.name,
         "joint_names": list(hand.joint_names),
         "closes": [bool(moves) for moves in hand.closing.moves],
-        "generation": dataclasses.asdict(config),
+        "generation": {**dataclasses.asdict(config), "hand": hand.name},
         "versions": {"ffhnet": version("ffhnet"), "mujoco": version("mujoco"), "numpy": version("numpy")},
         "generator_sha256": None if config.weights is None else _digest(Path(config.weights)),
     }

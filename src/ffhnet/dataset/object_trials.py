@@ -32,7 +32,7 @@ class GenerateConfig:
     """What is tried on each object.
 
     Attributes:
-        hand: name of the hand.
+        hand: name of the hand, or path of its TOML.
         seed: of all randomness, together with the object's seed.
         placements: resting poses per object, at most.
         views: simulated views per placement.

@@ -18,8 +18,10 @@ from ffhnet.geometry.rotations import matrix_from_euler_xyz
 from ffhnet.geometry.transforms import invert, make_transform
 from ffhnet.hands.confinement import check_inside
 from ffhnet.hands.kinematics import KinematicTree, read_mjcf
+from ffhnet.hands.packaged import PackagedModel
 
 if TYPE_CHECKING:
+    import mujoco
     import trimesh
 
 if sys.version_info >= (3, 11):
@@ -56,6 +58,7 @@ class Hand:
     Attributes:
         name: the hand's name, as in files and weights.
         mjcf: path of the MuJoCo model.
+        converted: the model itself where `mjcf` is a package's and was rewritten (`packaged.py`), else None.
         joint_names: the actuated joints in the order of every joint array.
         T_root_palm: pose of the palm frame in the hand's root frame.
         eigengrasp_origin: joint angles at all weights zero, rad.
@@ -70,11 +73,20 @@ class Hand:
     eigengrasp_origin: Float[np.ndarray, " J"]
     eigengrasps: Float[np.ndarray, "E J"]
     closing: ClosingMotion
+    converted: str | None = None
 
     @cached_property
     def tree(self) -> KinematicTree:
         """Bodies, shapes and fingertips, read from the MJCF."""
-        return read_mjcf(self.mjcf)
+        return read_mjcf(self.mjcf, self.converted)
+
+    def spec(self) -> mujoco.MjSpec:
+        """The MuJoCo model, to be compiled or attached to others; ValueError where MuJoCo cannot read it."""
+        import mujoco
+
+        if self.converted is not None:
+            return mujoco.MjSpec.from_string(self.converted)
+        return mujoco.MjSpec.from_file(str(self.mjcf))
 
     @cached_property
     def lower(self) -> Float[np.ndarray, " J"]:
@@ -161,16 +173,20 @@ def load_hand(name_or_toml: str = DEFAULT_HAND) -> Hand:
 
 
 def _from_description(description: dict[str, Any], folder: Path) -> Hand:
-    joint_names = tuple(description["joint_order"])
+    if "package" in description:
+        packaged = PackagedModel.from_description(description["package"])
+        joint_names, mjcf, converted = packaged.joint_order, packaged.path, packaged.convert()
+    else:
+        joint_names, mjcf, converted = tuple(description["joint_order"]), folder / description["model"], None
+        check_inside(folder, Path(description["model"]))
     closing = description["closing"]
     unknown = set(closing["joints"]) - set(joint_names)
     if unknown:
         raise HandError(f"closing.joints names unknown joints: {', '.join(sorted(unknown))}")
     palm = description["palm"]
-    check_inside(folder, Path(description["model"]))
     return Hand(
         name=description["name"],
-        mjcf=folder / description["model"],
+        mjcf=mjcf,
         joint_names=joint_names,
         T_root_palm=make_transform(
             matrix_from_euler_xyz(np.array(palm["rpy"], dtype=float)), np.array(palm["position"], dtype=float)
@@ -184,6 +200,7 @@ def _from_description(description: dict[str, Any], folder: Path) -> Hand:
             duration=float(closing["duration"]),
             squeeze=float(closing["squeeze"]),
         ),
+        converted=converted,
     )
 
 

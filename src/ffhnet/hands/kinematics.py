@@ -128,10 +128,15 @@ def _hinges(cross: Float[Tensor, "L 3 3"], angle: Float[Tensor, "B L"]) -> Float
     return transform
 
 
-def read_mjcf(path: Path) -> KinematicTree:
-    """The kinematic tree of a hand's MJCF; raises HandError where the file is not a hand of the subset."""
+def read_mjcf(path: Path, text: str | None = None) -> KinematicTree:
+    """The kinematic tree of a hand's MJCF; raises HandError where it is not a hand of the subset.
+
+    Args:
+        path: the file.
+        text: what to read instead of its content.
+    """
     try:
-        root = ET.parse(path).getroot()
+        root = ET.parse(path).getroot() if text is None else ET.fromstring(text)
     except (OSError, ET.ParseError) as error:
         raise HandError(f"cannot read the hand model {path.name}: {error}") from error
     check_confined(root, path)

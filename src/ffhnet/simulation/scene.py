@@ -128,7 +128,7 @@ def build_scene(
 
     if obj is not None:
         add_object(spec, obj)
-    hand_spec = mujoco.MjSpec.from_file(str(hand.mjcf))
+    hand_spec = hand.spec()
     mount = add_mount(spec)
     root = mount.add_frame().attach_body(hand_spec.worldbody.first_body(), PREFIX, "")
     if mount.mocap:
