@@ -5,12 +5,13 @@ Bounds are stated in `docs/robustness.md`; the weights are the package's own.
 
 import numpy as np
 import pytest
-from scenes import depth_view, object_view
+from scenes import LIKE_OBJECTS, STRANGE, depth_view, object_view
 
 from ffhnet.errors import CloudError
 from ffhnet.geometry.rotations import about_z, matrix_from_rotation_vector
 from ffhnet.geometry.transforms import apply, make_transform
 from ffhnet.inference import FFHNet
+from ffhnet.inference.novelty import novelty
 from ffhnet.perception.camera import REALSENSE_D415
 from ffhnet.perception.cloud import depth_to_cloud
 from ffhnet.perception.observation import observe_depth, observe_object, observe_scene
@@ -110,22 +111,27 @@ def test_noise_does_not_raise_hopes(network):
     assert hope(8.0) < usual - 0.2
 
 
-def uniform(low, high, number=4000):
-    return np.random.default_rng(0).uniform(low, high, (number, 3))
-
-
 @pytest.mark.parametrize(
     ("cloud", "bound"),
     [
-        (uniform([-0.3, -0.3, -0.001], [0.3, 0.3, 0.001]), 0.1),
-        (uniform([-0.001, -0.4, 0.0], [0.001, 0.4, 0.6]), 0.1),
-        (uniform([-2.0, -0.9, 0.0], [2.0, 0.9, 1.5]), 0.1),
-        (uniform([-0.2, -0.001, 0.019], [0.2, 0.001, 0.021]), 0.4),
+        (STRANGE["table top, 60 cm"], 0.1),
+        (STRANGE["wall, 80 cm"], 0.1),
+        (STRANGE["car"], 0.1),
+        (LIKE_OBJECTS["wire, 40 cm"], 0.4),
     ],
     ids=["plane", "wall", "car", "wire"],
 )
 def test_what_no_network_was_trained_on_promises_little(network, cloud, bound):
     assert network.grasp(observe_object(cloud, UP, "world"), NUM).probability.mean() < bound
+
+
+@pytest.mark.parametrize("name", STRANGE)
+def test_what_is_no_object_is_stranger_than_objects(network, cut_out, name):
+    def score(seen):
+        return novelty(network.evaluator.condition, seen.bps)
+
+    cloud, camera, _ = cut_out
+    assert score(observe_object(STRANGE[name], UP, "world")) > 1.5 * score(see(cloud, camera))
 
 
 @pytest.mark.parametrize("far", [1.0, 100.0, 1e6, 1e30])
