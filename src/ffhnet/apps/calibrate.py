@@ -11,6 +11,7 @@ import tyro
 
 from ffhnet.apps.console import print_table, progress_bar
 from ffhnet.apps.extras import require_sim
+from ffhnet.apps.hand_option import HandOption, for_workers
 from ffhnet.errors import OptionError, SceneError
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ class CalibrateOptions:
 
     weights: Annotated[Path, tyro.conf.Positional]
     """Folder of weights; gets calibration.json."""
+    hand: HandOption = None
+    """Name or TOML file of the hand."""
     objects: str = "procedural-val:184,varied-val:100"
     """Objects that trained nothing."""
     first: int = 24
@@ -71,13 +74,10 @@ def run(options: CalibrateOptions) -> None:
         raise OptionError(
             f"--fit must leave 2 of the {len(sources)} objects on either side, got {options.fit}"
         )
-    robust = load_checkpoint(options.weights).info.model.judge_robustness
-    jobs = [
-        OwnSamplesJob(
-            source, str(options.weights), options.views, options.samples, options.executed, options.seed
-        )
-        for source in sources
-    ]
+    info = load_checkpoint(options.weights).info
+    robust, hand = info.model.judge_robustness, for_workers(options.hand or info.hand, info.hand)
+    drawn = (options.views, options.samples, options.executed, options.seed)
+    jobs = [OwnSamplesJob(source, str(options.weights), hand, *drawn) for source in sources]
     with progress_bar("objects", len(jobs)) as step:
         found = run_jobs(try_own_samples, jobs, options.workers, step)
     fitting = [view for views in found[: options.fit] for view in views]

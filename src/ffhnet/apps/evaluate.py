@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from ffhnet.apps.console import absent, busy, progress_bar
 from ffhnet.apps.evaluate_arm import run_arm
 from ffhnet.apps.extras import require_sim
+from ffhnet.apps.hand_option import HandOption, for_workers, weights_for
 from ffhnet.errors import OptionError
 
 if TYPE_CHECKING:
@@ -29,6 +30,8 @@ class EvaluateOptions:
     """With the arm: other objects in each scene."""
     weights: Annotated[Path | None, absent("DIR", "the shipped weights")] = None
     """Folder of weights."""
+    hand: HandOption = None
+    """Name or TOML file of the hand."""
     placements: int = 3
     """Random views per object."""
     poses: Literal["standing", "all"] = "standing"
@@ -98,7 +101,7 @@ def run(options: EvaluateOptions) -> None:
         write_atomically(options.json, table.to_json(described).encode())
     if options.html is not None:
         with busy("drawing the report"):
-            figures = draw_figures(outcomes, {source.name: source.load for source in sources})
+            figures = draw_figures(outcomes, {source.name: source.load for source in sources}, protocol.hand)
             text = report(table, described, describe_machine(), figures)
         write_atomically(options.html, text.encode())
 
@@ -123,7 +126,8 @@ def _protocol(options: EvaluateOptions) -> Protocol:
     same = {f.name for f in dataclasses.fields(Protocol)} & {f.name for f in dataclasses.fields(options)}
     physics = Physics()
     return Protocol(
-        **{name: getattr(options, name) for name in same - {"weights"}},
-        weights=None if options.weights is None else str(options.weights),
+        **{name: getattr(options, name) for name in same - {"weights", "hand"}},
+        weights=weights_for(options.weights, options.hand),
+        hand=None if options.hand is None else for_workers(options.hand),
         physics=dataclasses.replace(physics, friction=(options.friction, *physics.friction[1:])),
     )

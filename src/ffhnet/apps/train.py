@@ -11,6 +11,7 @@ import tyro
 
 from ffhnet.apps.console import absent, print_table
 from ffhnet.apps.extras import require_sim
+from ffhnet.apps.hand_option import HandOption, for_workers
 from ffhnet.errors import OptionError
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ class TrainOptions:
     """Folder of the weights."""
     val: Annotated[Path | None, absent("DIR")] = None
     """Data set of held-out objects to measure on."""
+    hand: HandOption = None
+    """Name or TOML file of the hand."""
     preset: Literal["default", "paper"] = "default"
     """The project's own architecture and recipe, or the paper's (section III-D; hours on a CPU)."""
     generator: Annotated[Literal["flow", "cvae"] | None, absent("flow|cvae", "the preset's")] = None
@@ -86,7 +89,7 @@ def _train(options: TrainOptions, processes: Processes) -> None:
     torch.set_num_threads(options.threads)
     data = read_training_data(list(options.data))
     val = None if options.val is None else read_training_data([options.val])
-    hand = load_hand(data.hand)
+    hand = load_hand(for_workers(options.hand or data.hand, data.hand))
     limits = (hand.lower.tolist(), hand.upper.tolist())
     generator, evaluator = _config(options, "generator"), _config(options, "evaluator")
     count = evaluator.model.palm_points

@@ -74,16 +74,19 @@ def choose_views(views: Sequence[ViewOutcome], count: int) -> list[ViewOutcome]:
 
 
 def draw_figures(
-    views: Sequence[ViewOutcome], objects: Mapping[str, Callable[[], GraspObject]]
+    views: Sequence[ViewOutcome],
+    objects: Mapping[str, Callable[[], GraspObject]],
+    hand: str | None = None,
 ) -> dict[str, Image.Image]:
     """All figures by the paper's number; none without a full view.
 
     Args:
         views: of the evaluation, all of the same hand.
         objects: builds each object by its name.
+        hand: name or TOML file of the hand, or None for the one by the name in the grasps.
     """
-    hand = load_hand(views[0].samples.grasps.hand)
-    drawn = {"5": figure5(views, objects), "6": figure6(views, objects, hand), "7": figure7(views, hand)}
+    loaded = load_hand(hand or views[0].samples.grasps.hand)
+    drawn = {"5": figure5(views, objects), "6": figure6(views, objects, loaded), "7": figure7(views, loaded)}
     return {number: image for number, image in drawn.items() if image is not None}
 
 

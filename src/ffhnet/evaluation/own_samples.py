@@ -30,6 +30,7 @@ class OwnSamplesJob:
     Attributes:
         source: the object.
         weights: folder of weights; a calibration in it is not used.
+        hand: name or TOML file of their hand.
         views: views of the object, its resting poses in turn.
         samples: grasps sampled and rated per view.
         executed: random ones among them that are executed.
@@ -38,6 +39,7 @@ class OwnSamplesJob:
 
     source: ObjectSource
     weights: str
+    hand: str
     views: int
     samples: int
     executed: int
@@ -72,7 +74,7 @@ def try_own_samples(job: OwnSamplesJob) -> list[OwnSamples]:
     """All views of one object; a view on which nothing can be told from the table is left out."""
     torch.set_num_threads(1)
     network, obj = _load_network(job.weights), job.source.load()
-    trial = GraspTrial(build_scene(load_hand(network.info.hand), obj))
+    trial = GraspTrial(build_scene(load_hand(job.hand), obj))
     makers = [ViewMaker(obj, pose) for pose in obj.resting_poses[: job.views]]
     found = []
     for number in range(job.views):

@@ -53,6 +53,7 @@ class Protocol:
 
     Attributes:
         weights: folder of weights, or None for the shipped ones.
+        hand: name or TOML file of the hand, or None for the one by the name in the weights.
         placements: random views per object; turning the camera and turning the object are the same.
         poses: "standing" puts every object down as modelled; "all" puts it into its other resting poses on
             the last third of its views (`pose_of_view`).
@@ -68,6 +69,7 @@ class Protocol:
     """
 
     weights: str | None = None
+    hand: str | None = None
     placements: int = 3
     poses: Poses = "standing"
     samples: int = 400
@@ -166,7 +168,7 @@ class _ViewTrials:
         self._obj, self._T_world_object, self._view = obj, T_world_object, view
         self._protocol, self._streams = protocol, streams
         self._network = load_network(protocol.weights)
-        self._hand: Hand = load_hand(self._network.info.hand)
+        self._hand: Hand = load_hand(protocol.hand or self._network.info.hand)
         self._trial = GraspTrial(build_scene(self._hand, obj, protocol.physics))
 
     def run(self, pose_name: str, full: bool) -> ViewOutcome:

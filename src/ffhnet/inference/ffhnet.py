@@ -13,6 +13,7 @@ from jaxtyping import Float
 from ffhnet.errors import HandError, OptionError, WeightsError
 from ffhnet.geometry.transforms import invert
 from ffhnet.grasps import Grasps
+from ffhnet.hands import DEFAULT_HAND
 from ffhnet.inference import hub
 from ffhnet.inference.engine import Engine, SeenObject
 from ffhnet.inference.novelty import novelty
@@ -61,7 +62,7 @@ class FFHNet:
         """Load trained weights.
 
         Args:
-            path_or_name: as in `find_weights`; None takes the package's own.
+            path_or_name: as in `find_weights`; None takes the package's own for the hand.
             hand: name of the hand that the weights must be for; None takes any.
             device: None takes CUDA where there is one, else the CPU.
 
@@ -71,7 +72,7 @@ class FFHNet:
         """
         if device is None:
             device = "cuda" if torch.cuda.is_available() else "cpu"
-        folder = find_weights(path_or_name)
+        folder = find_weights(path_or_name, hand)
         return cls(load_checkpoint(folder, hand=hand), device, load_calibration(folder))
 
     def grasp(
@@ -198,19 +199,25 @@ def shipped_weights() -> Path:
     return Path(str(resources.files("ffhnet"))) / "weights"
 
 
-def find_weights(path_or_name: str | Path | None) -> Path:
+def find_weights(path_or_name: str | Path | None, hand: str | None = None) -> Path:
     """The folder of weights that a user names.
 
     Args:
         path_or_name: a folder; else the name of weights that ship with the package; else a repository of a
             model hub, "org/name" or "org/name@revision" (`hub.py`). None takes the package's own.
+        hand: name of the hand whose weights None stands for; the default one if not given.
 
     Raises:
         WeightsError: there is none.
         MissingExtraError: it can only be a repository, and the extra `hub` is not installed.
     """
     if path_or_name is None:
-        return shipped_weights()
+        folder = shipped_weights() if hand in (None, DEFAULT_HAND) else shipped_weights() / str(hand)
+        if not folder.is_dir():
+            raise WeightsError(
+                f"no weights for the hand {hand!r} come with the package: name a folder of them"
+            )
+        return folder
     for folder in (Path(path_or_name), shipped_weights() / path_or_name):
         if folder.is_dir():
             return folder
