@@ -4,7 +4,7 @@ import trimesh
 
 from ffhnet.errors import CloudError
 from ffhnet.perception.camera import Intrinsics
-from ffhnet.perception.cloud import depth_to_cloud, estimate_normals, search_tree, validate_cloud
+from ffhnet.perception.cloud import bounding_box, depth_to_cloud, estimate_normals, search_tree, validate_cloud
 
 K = Intrinsics(fx=90.0, fy=110.0, cx=31.5, cy=20.25, width=64, height=48)
 
@@ -20,6 +20,19 @@ def test_cloud_projects_back_to_its_pixels():
     np.testing.assert_allclose(cloud[:, 1] / cloud[:, 2] * K.fy + K.cy, v, atol=1e-9)
     np.testing.assert_array_equal(cloud[:, 2], depth.ravel()[pixels])
     assert len(cloud) == (np.isfinite(depth) & (depth > 0)).sum()
+
+
+def test_cloud_is_the_point_of_each_pixel_to_the_last_bit():
+    depth = np.random.default_rng(1).uniform(-0.2, 1.0, (48, 64))
+    depth[10, 10:20] = np.inf
+    rays = [((u - K.cx) / K.fx, (v - K.cy) / K.fy, 1.0) for v in range(48) for u in range(64)]
+    plain = [np.multiply(ray, z) for ray, z in zip(rays, depth.ravel(), strict=True) if 0 < z < np.inf]
+    np.testing.assert_array_equal(depth_to_cloud(depth, K)[0], plain)
+
+
+def test_bounding_box():
+    points = np.random.default_rng(0).normal(size=(500, 3))
+    np.testing.assert_array_equal(bounding_box(points), [points.min(axis=0), points.max(axis=0)])
 
 
 def test_depth_of_another_size_is_refused():

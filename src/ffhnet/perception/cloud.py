@@ -41,12 +41,25 @@ def depth_to_cloud(
     wanted = (intrinsics.height, intrinsics.width)
     if np.shape(depth) != wanted:
         raise CloudError(f"the intrinsics want a depth image of {wanted} pixels, got {np.shape(depth)}")
-    flat = np.asarray(depth, dtype=float).ravel()
-    pixels = np.flatnonzero((flat > 0) & np.isfinite(flat))
-    z = flat[pixels]
-    v, u = np.divmod(pixels, intrinsics.width)
+    depth = np.asarray(depth, dtype=float)
+    pixels = np.flatnonzero((depth > 0) & (depth < np.inf))
     x, y = intrinsics.rays()
-    return np.column_stack([x[u] * z, y[v] * z, z]), pixels
+    # The whole image first: rows of it are taken faster than its columns and rays one by one.
+    points = np.empty((*wanted, 3))
+    with np.errstate(invalid="ignore"):
+        np.multiply(depth, x, out=points[..., 0])
+        np.multiply(depth, y[:, None], out=points[..., 1])
+    points[..., 2] = depth
+    return points.reshape(-1, 3).take(pixels, axis=0), pixels
+
+
+def bounding_box(
+    points: Float[np.ndarray, "N 3"],
+) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
+    """The lowest and the highest corner of the box around points."""
+    # Column by column: NumPy reduces rows so short ten times slower.
+    columns = [points[:, axis] for axis in range(3)]
+    return np.array([column.min() for column in columns]), np.array([column.max() for column in columns])
 
 
 def search_tree(points: Float[np.ndarray, "N 3"]) -> cKDTree:

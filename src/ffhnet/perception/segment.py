@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from ffhnet.errors import SceneError
-from ffhnet.perception.cloud import MIN_POINTS, search_tree
+from ffhnet.perception.cloud import MIN_POINTS, bounding_box, search_tree
 from ffhnet.perception.hanging import join_hanging
 from ffhnet.perception.table import Plane
 
@@ -71,7 +71,8 @@ def segment_objects(
     on_plane = np.flatnonzero(np.abs(height) < min_height)
     on_plane = on_plane[:: 1 + len(on_plane) // _TABLE_SAMPLE]
     standing = np.flatnonzero((height > min_height) & (height < _MAX_SIZE))
-    over_table = _inside(plane.coordinates(cloud[standing]), plane.coordinates(cloud[on_plane]))
+    places, table = (plane.coordinates(cloud.take(part, axis=0)) for part in (standing, on_plane))
+    over_table = _inside(places, table)
     standing = standing[over_table]
     noise = 1.48 * float(np.median(np.abs(height[on_plane]))) if len(on_plane) else 0.0
     seed_height = max(min_height, min(min_height + _SEED_SD * noise, _MAX_SEED_HEIGHT))
@@ -81,7 +82,7 @@ def segment_objects(
             f"no object on the table: wanted {MIN_POINTS} points above {1000 * seed_height:.0f} mm, "
             f"got {len(seeds)}"
         )
-    labels = _clusters(cloud[seeds])
+    labels = _clusters(cloud.take(seeds, axis=0))
     low = standing[height[standing] <= seed_height]
     parts = [
         np.concatenate([members, foot])
@@ -92,11 +93,12 @@ def segment_objects(
     found = []
     for owner in np.unique(part_of):
         members = np.sort(np.concatenate([parts[i] for i in np.flatnonzero(part_of == owner)]))
-        if np.ptp(cloud[members], axis=0).max() < _MAX_SIZE:
+        low_corner, high_corner = bounding_box(cloud.take(members, axis=0))
+        if (high_corner - low_corner).max() < _MAX_SIZE:
             found.append(members)
     if not found:
         raise SceneError(f"no object on the table: no cluster of {MIN_POINTS} points below {_MAX_SIZE} m")
-    return sorted(found, key=lambda members: (_is_cut_off(members, cloud), -_prominence(cloud[members])))
+    return sorted(found, key=lambda members: (_is_cut_off(members, cloud), -_prominence(cloud.take(members, axis=0))))
 
 
 def _is_cut_off(members: Int[np.ndarray, " M"], cloud: Float[np.ndarray, "N 3"]) -> bool:
@@ -104,8 +106,8 @@ def _is_cut_off(members: Int[np.ndarray, " M"], cloud: Float[np.ndarray, "N 3"])
     rest = np.ones(len(cloud), dtype=bool)
     rest[members] = False
     some = slice(None, None, 1 + len(cloud) // _TABLE_SAMPLE)
-    view = _bearings(cloud[some][rest[some]])
-    bearings = _bearings(cloud[members])
+    view = _bearings(cloud[some].compress(rest[some], axis=0))
+    bearings = _bearings(cloud.take(members, axis=0))
     low = np.abs(bearings.min(axis=1) - view.min(axis=1)) < _BORDER
     high = np.abs(bearings.max(axis=1) - view.max(axis=1)) < _BORDER
     return bool((low | high).any())
@@ -145,7 +147,7 @@ def _inside(points: Float[np.ndarray, "N 2"], table: Float[np.ndarray, "M 2"]) -
 
 def _clusters(points: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
     """Label of each point's Euclidean cluster, -1 for stray points."""
-    cells = np.floor((points - points.min(axis=0)) / _VOXEL).astype(int)
+    cells = np.floor((points - bounding_box(points)[0]) / _VOXEL).astype(int)
     # One number per voxel, because sorting rows is slow.
     keys = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
     _, first, voxel_of, counts = np.unique(keys, return_index=True, return_inverse=True, return_counts=True)

@@ -85,7 +85,7 @@ def fit_table(
     """
     if len(cloud) < 3:
         raise SceneError(f"a table plane wants at least 3 points, got {len(cloud)}")
-    sample = cloud[rng.integers(len(cloud), size=_SAMPLE)]
+    sample = cloud.take(rng.integers(len(cloud), size=_SAMPLE), axis=0)
     normals, offsets = _hypotheses(sample, rng)
     if up_hint is None:
         up, limit = _CAMERA_UP_GUESS, _MAX_TILT_DEGREES["guess"]
@@ -108,7 +108,7 @@ def fit_table(
     score = np.where(allowed, support * cosine, 0.0)
     best = _above_floor(normals, offsets, score)
     plane = Plane(normals[best], float(offsets[best]))
-    dense = cloud[rng.integers(len(cloud), size=_REFINE_SAMPLE)]
+    dense = cloud.take(rng.integers(len(cloud), size=_REFINE_SAMPLE), axis=0)
     # The last round leaves out the lowest centimetre of the objects, which would lift the plane.
     for reach in (threshold, threshold, threshold / 2):
         plane = _refit(dense, plane, reach)
@@ -160,10 +160,10 @@ def _hypotheses(
 
 def _refit(points: Float[np.ndarray, "N 3"], plane: Plane, reach: float) -> Plane:
     """Least-squares plane of the points within `reach` (m) of a plane, with the normal on the same side."""
-    near = points[np.abs(plane.height(points)) < reach]
+    near = points.compress(np.abs(plane.height(points)) < reach, axis=0)
     if len(near) < 10:
         return plane
-    middle = near.mean(axis=0)
+    middle = np.einsum("ij->j", near) / len(near)  # the mean, several times faster
     centred = near - middle
     _, axes = np.linalg.eigh(centred.T @ centred)
     normal = axes[:, 0] * np.sign(axes[:, 0] @ plane.normal)
