@@ -4,7 +4,13 @@ import trimesh
 
 from ffhnet.errors import CloudError
 from ffhnet.perception.camera import Intrinsics
-from ffhnet.perception.cloud import bounding_box, depth_to_cloud, estimate_normals, search_tree, validate_cloud
+from ffhnet.perception.cloud import (
+    bounding_box,
+    depth_to_cloud,
+    estimate_normals,
+    search_tree,
+    validate_cloud,
+)
 
 K = Intrinsics(fx=90.0, fy=110.0, cx=31.5, cy=20.25, width=64, height=48)
 

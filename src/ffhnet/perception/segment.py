@@ -98,7 +98,7 @@ def segment_objects(
             found.append(members)
     if not found:
         raise SceneError(f"no object on the table: no cluster of {MIN_POINTS} points below {_MAX_SIZE} m")
-    return sorted(found, key=lambda members: (_is_cut_off(members, cloud), -_prominence(cloud.take(members, axis=0))))
+    return sorted(found, key=lambda members: (_is_cut_off(members, cloud), -_prominence(cloud[members])))
 
 
 def _is_cut_off(members: Int[np.ndarray, " M"], cloud: Float[np.ndarray, "N 3"]) -> bool:
