@@ -1,5 +1,5 @@
-# make demo: grasps for an example depth image.   make test: every check that has to pass.
-# Both make their own environment in .venv first; nothing is installed outside this folder.
+# make demo: grasps for an example depth image.   make view: the same in the browser.   make test: every check.
+# All make their own environment in .venv first; nothing is installed outside this folder.
 
 SHELL := bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -27,15 +27,24 @@ $(VENV)/.demo: $(BIN)/python pyproject.toml constraints.txt
 	@$(PIP_INSTALL) -e . | $(PROGRESS)
 	@touch $@
 
+$(VENV)/.view: $(BIN)/python pyproject.toml constraints.txt
+	@$(PIP_INSTALL) -e ".[sim,viewer]" | $(PROGRESS)
+	@touch $@ $(VENV)/.demo
+
 $(VENV)/.dev: $(BIN)/python pyproject.toml constraints.txt
 	@$(PIP_INSTALL) -e ".[dev]" | $(PROGRESS)
-	@touch $@ $(VENV)/.demo
+	@touch $@ $(VENV)/.demo $(VENV)/.view
 
 .PHONY: demo
 demo: $(VENV)/.demo
 	@mkdir -p out
 	$(BIN)/ffhnet grasp examples/data/spray_flask_2000005_depth.png --intrinsics 615 615 320 240 \
 	  --out out/grasps.json --plot out/grasps.png
+	@echo "Next: look at out/grasps.png, or make view"
+
+.PHONY: view
+view: $(VENV)/.view
+	$(BIN)/ffhnet view
 
 .PHONY: test
 test: $(VENV)/.dev

@@ -1,4 +1,4 @@
-"""Makes docs/images/viewer.png: two looks at the viewer in headless Chromium, side by side.
+"""Makes docs/images/viewer.png: ranked hands, and the end of a trial, in headless Chromium, side by side.
 
 Run it from the repository root: python docs/make_viewer_picture.py
 """
@@ -16,9 +16,9 @@ from ffhnet.apps.viewer.sight import Looker
 from ffhnet.apps.viewer.viewer import Viewer
 
 EXAMPLE = "spray_flask_2000005"
-HANDS = 4
+HANDS = 3
 PICTURE = Path(__file__).parent / "images" / "viewer.png"
-SCENE, PANEL, HEIGHT = 640, 320, 860  # pixels
+SCENE, PANEL, HEIGHT = 640, 320, 930  # pixels
 PATIENCE = 600_000  # ms: without a graphics processor a frame can take seconds
 ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
@@ -30,7 +30,7 @@ def photograph(page: Page) -> Image.Image:
 
 
 def main() -> None:
-    """All hands on the left, one grasp and the panel on the right."""
+    """All hands on the left; one that has lifted the object, and the panel, on the right."""
     options = NetworkOptions()
     network, hand = load_network(options)
     server = viser.ViserServer("127.0.0.1", 0, verbose=False)
@@ -47,6 +47,8 @@ def main() -> None:
         page.add_style_tag(content=".mantine-Notifications-root { display: none }")
         everything = photograph(page)
         viewer.panel.grasp.value = viewer.panel.grasp.options[1]
+        page.get_by_role("button", name="Try it in physics").click()
+        page.get_by_text("held: the object rose").wait_for()
         one = photograph(page)
         browser.close()
     server.stop()

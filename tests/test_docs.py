@@ -3,6 +3,7 @@
 import re
 import shlex
 import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,15 @@ def names(command):
 def test_pages_show_commands():
     assert len(SHOWN) >= 15
     assert any(command[0] == "grasp" for command in SHOWN)
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="there is no make here")
+def test_make_knows_what_the_pages_make():
+    blocks = [block for page in PAGES for _, block in FENCE.findall(page.read_text(encoding="utf-8"))]
+    lines = [line for block in blocks for line in block.splitlines()]
+    targets = sorted({line.split()[1] for line in lines if line.startswith("make ")})
+    assert targets == ["demo", "test", "view"]
+    subprocess.run(["make", "--dry-run", *targets], cwd=ROOT, check=True, capture_output=True)
 
 
 def test_page_of_examples_shows_all():

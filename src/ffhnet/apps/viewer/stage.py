@@ -25,11 +25,14 @@ FIELD_OF_VIEW = np.radians(32.0)
 MAX_FACES = 1200
 """Most faces of a link, so that dozens of hands are drawn at once; primitive shapes have fewer."""
 
-_AROUND = 0.2
+_AROUND = 0.24
 """m around an object that the camera sees: the hands stand there."""
 
+_ABOVE = 0.1
+"""m above an object's middle to which the camera looks: there it is lifted."""
+
 _POINT = 0.0022  # m
-_PALM_OPACITY = 0.25
+_PALM_OPACITY = 0.35
 _OBJECT = (236, 190, 130)
 _SQUARE = 0.05  # m
 _TABLE = (238, 240, 243)
@@ -100,7 +103,7 @@ class Stage:
     def frame_camera(self, sight: Sight) -> None:
         """Puts every camera, and that of browsers to come, where the seen side and the hands are in sight."""
         low, high = sight.cloud.min(axis=0), sight.cloud.max(axis=0)
-        middle = (low + high) / 2
+        middle = (low + high) / 2 + np.array([0.0, 0.0, _ABOVE])
         across = np.cross([0.0, 0.0, 1.0], sight.forward)
         towards = -sight.forward - 0.75 * across + np.array([0.0, 0.0, 0.62])
         reach = _AROUND + float(np.linalg.norm(high - low)) / 2
