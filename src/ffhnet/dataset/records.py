@@ -141,7 +141,7 @@ def write_table(table: pa.Table, path: Path) -> None:
     """Writes a Parquet file so that it is there whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     buffer = pa.BufferOutputStream()
-    pq.write_table(table, buffer, compression="zstd", compression_level=9)
+    pq.write_table(table, buffer, compression="zstd", compression_level=9, write_page_checksum=True)
     write_atomically(path, buffer.getvalue().to_pybytes())
 
 
@@ -187,11 +187,18 @@ def read_tables(folder: Path, kind: str) -> pa.Table:
     if not files:
         raise DatasetError(f"{folder} holds no {kind}")
     try:
-        for file in files:
-            _check_rows(pq.read_metadata(file).num_rows, file)
-        return pa.concat_tables([pq.read_table(file) for file in files]).unify_dictionaries()
+        return pa.concat_tables([_read_table(file) for file in files]).unify_dictionaries()
+    except pa.ArrowException as error:
+        raise DatasetError(f"{folder}: the files of {kind} do not go together ({error})") from error
+
+
+def _read_table(file: Path) -> pa.Table:
+    """All rows of a file, their checksums compared where it has any. Raises DatasetError."""
+    try:
+        _check_rows(pq.read_metadata(file).num_rows, file)
+        return pq.read_table(file, page_checksum_verification=True)
     except (OSError, pa.ArrowException) as error:
-        raise DatasetError(f"{folder}: a file of {kind} is damaged ({error})") from error
+        raise DatasetError(f"{file} is damaged ({error})") from error
 
 
 def _check_rows(rows: int, file: Path) -> None:

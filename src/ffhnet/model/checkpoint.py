@@ -15,6 +15,7 @@ import torch
 from torch import nn
 
 from ffhnet.errors import OptionError, WeightsError
+from ffhnet.files import write_atomically
 from ffhnet.model.config import ModelConfig
 from ffhnet.model.evaluator import FFHEvaluator
 from ffhnet.model.flow import FlowGenerator
@@ -91,6 +92,7 @@ def save_checkpoint(
 
     Raises:
         WeightsError: the folder already holds weights of another hand or architecture.
+        OptionError: a file cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     digests: dict[str, str] = {}
@@ -103,10 +105,11 @@ def save_checkpoint(
     for name, network in networks.items():
         if network is not None:
             data = safetensors.torch.save(_storable(network, half))
-            (folder / name).write_bytes(data)
+            write_atomically(folder / name, data)
             digests[name] = hashlib.sha256(data).hexdigest()
     content = {"format": FORMAT, **dataclasses.asdict(info), "sha256": digests}
-    (folder / CONFIG_FILE).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    # Last: until it is written, the checksums in it tell that weights are not those that it describes.
+    write_atomically(folder / CONFIG_FILE, (json.dumps(content, indent=1) + "\n").encode())
 
 
 def load_checkpoint(folder: Path, hand: str | None = None, device: torch.device | str = "cpu") -> Checkpoint:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -10,7 +11,10 @@ import safetensors.torch
 import torch
 from torch import Tensor, nn
 
-from ffhnet.errors import WeightsError
+from ffhnet.errors import OptionError, WeightsError
+from ffhnet.files import write_atomically
+
+_DIGEST = "run/sha256"
 
 
 def pack_state(step: int, identity: str, module: nn.Module, optimizer: torch.optim.Optimizer) -> bytes:
@@ -28,7 +32,9 @@ def pack_state(step: int, identity: str, module: nn.Module, optimizer: torch.opt
     tensors["run/step"] = torch.tensor(step)
     # As a tensor, since safetensors gives metadata only of files, and this also goes between processes.
     tensors["run/identity"] = torch.frombuffer(bytearray(identity.encode()), dtype=torch.uint8)
-    return safetensors.torch.save({name: t.detach().cpu().contiguous() for name, t in tensors.items()})
+    kept = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
+    kept[_DIGEST] = torch.frombuffer(bytearray(_digest(kept)), dtype=torch.uint8)
+    return safetensors.torch.save(kept)
 
 
 def unpack_state(
@@ -48,6 +54,10 @@ def unpack_state(
     """
     try:
         tensors = safetensors.torch.load(content)
+        # States of before there were checksums have none.
+        promised = tensors.pop(_DIGEST, None)
+        if promised is not None and bytes(promised.numpy()) != _digest(tensors):
+            raise WeightsError(f"{path} is damaged, its checksum differs: remove it to start afresh")
         step, came = int(tensors.pop("run/step")), tensors.pop("run/identity")
     except (safetensors.SafetensorError, KeyError) as error:
         raise WeightsError(f"{path} is damaged, remove it to start afresh: {error}") from error
@@ -68,6 +78,15 @@ def unpack_state(
     return step
 
 
+def _digest(tensors: dict[str, Tensor]) -> bytes:
+    """SHA-256 of names, types, shapes and values."""
+    digest = hashlib.sha256()
+    for name, tensor in sorted(tensors.items()):
+        digest.update(f"{name} {tensor.dtype} {tuple(tensor.shape)} ".encode())
+        digest.update(tensor.flatten().view(torch.uint8).numpy().tobytes())
+    return digest.digest()
+
+
 class JsonLog:
     """Appends one JSON object per line; rows beyond the step resumed from are dropped."""
 
@@ -77,9 +96,12 @@ class JsonLog:
         if path.exists() and done:
             lines = path.read_text(encoding="utf-8").splitlines()
             kept = [line for line in lines if line.endswith("}") and json.loads(line)["step"] <= done]
-        path.write_text("".join(line + "\n" for line in kept), encoding="utf-8")
+        write_atomically(path, "".join(line + "\n" for line in kept).encode())
 
     def write(self, step: int, values: dict[str, float]) -> None:
-        """Add a row."""
-        with self._path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps({"step": step, **values}) + "\n")
+        """Add a row. Raises OptionError where it cannot be written, as on a full disk."""
+        try:
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps({"step": step, **values}) + "\n")
+        except OSError as error:
+            raise OptionError(f"{self._path}: cannot write: {error.strerror}") from error
