@@ -1,5 +1,6 @@
 """`FFHNet`: ranking, frames, limits, determinism and refusals, with untrained networks."""
 
+import weakref
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -97,6 +98,25 @@ def test_evaluate_agrees_with_grasp_in_any_order(net: FFHNet, view: View):
     np.testing.assert_allclose(
         net.evaluate(view, grasps[order]).probability, grasps.probability[order], atol=1e-5
     )
+
+
+def test_an_observation_is_looked_at_once_and_then_forgotten(
+    net: FFHNet, view: View, monkeypatch: pytest.MonkeyPatch
+):
+    looked = []
+    look = net._look_anew
+    monkeypatch.setattr(net, "_look_anew", lambda observation: looked.append(0) or look(observation))
+    first, other = net.grasp(view, num=9), replace(view, table_height=view.table_height - 0.05)
+    net.evaluate(view, first)
+    assert len(looked) == 1
+    moved = net.grasp(other, num=9)
+    assert np.abs(moved.position - first.position).max() > 1e-6
+    np.testing.assert_array_equal(net.grasp(view, num=9).position, first.position)
+    assert len(looked) == 3
+    reference = weakref.ref(other)
+    net.grasp(other, num=9)
+    del other
+    assert reference() is None
 
 
 def test_threshold_keeps_the_best(net: FFHNet, view: View):
