@@ -43,8 +43,11 @@ def run(options: HandOptions) -> None:
         _check_shapes(hand)
         _check_eigengrasps(hand)
         compared = _compare_with_mujoco(hand)
+        found = _find(hand) if compared else []
     _show(hand)
     print("kinematics agree with MuJoCo" if compared else "MuJoCo is not installed: kinematics not compared")
+    for finding in found:
+        print(f"to be mended: {finding}")
     if options.plot is not None:
         with busy("drawing"):
             from ffhnet.evaluation.sheets import hand_picture
@@ -108,6 +111,12 @@ def _compare_with_mujoco(hand: Hand) -> bool:
         if max(np.abs(pose[:3, 3] - theirs.xpos).max(), np.abs(pose[:3, :3] - rotation).max()) > _AGREEMENT:
             raise HandError(f"MuJoCo places body '{body.name}' elsewhere than ffhnet reads it")
     return True
+
+
+def _find(hand: Hand) -> list[str]:
+    from ffhnet.apps.hand_findings import findings
+
+    return findings(hand)
 
 
 def _show(hand: Hand) -> None:

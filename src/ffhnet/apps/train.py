@@ -34,8 +34,9 @@ class TrainOptions:
     """Data set of held-out objects to measure on."""
     hand: HandOption = None
     """Name or TOML file of the hand."""
-    preset: Literal["default", "paper"] = "default"
-    """The project's own architecture and recipe, or the paper's (section III-D; hours on a CPU)."""
+    preset: Literal["default", "small", "paper"] = "default"
+    """The project's own architecture and recipe; a small one for a hand with little data; or the paper's
+    (section III-D; hours on a CPU)."""
     generator: Annotated[Literal["flow", "cvae"] | None, absent("flow|cvae", "the preset's")] = None
     """Flow matching, or the paper's conditional variational autoencoder."""
     networks: Literal["both", "generator", "evaluator"] = "both"
@@ -64,13 +65,19 @@ def run(options: TrainOptions) -> None:
         _train(options, processes)
 
 
-def _config(options: TrainOptions, network: Network) -> TrainingConfig:
+def _config(options: TrainOptions, network: Network, num_joints: int) -> TrainingConfig:
     """The preset's run of a network, with what the options change."""
     import dataclasses
 
     from ffhnet.training.config import TrainingConfig
+    from ffhnet.training.small import small_training
 
-    config = TrainingConfig.paper() if options.preset == "paper" else TrainingConfig.default(network)
+    if options.preset == "paper":
+        config = TrainingConfig.paper(num_joints)
+    elif options.preset == "small":
+        config = small_training(network, num_joints)
+    else:
+        config = TrainingConfig.default(network, num_joints)
     model = dataclasses.replace(config.model, generator=options.generator or config.model.generator)
     return dataclasses.replace(config, model=model, steps=options.steps or config.steps, seed=options.seed)
 
@@ -91,7 +98,8 @@ def _train(options: TrainOptions, processes: Processes) -> None:
     val = None if options.val is None else read_training_data([options.val])
     hand = load_hand(for_workers(options.hand or data.hand, data.hand))
     limits = (hand.lower.tolist(), hand.upper.tolist())
-    generator, evaluator = _config(options, "generator"), _config(options, "evaluator")
+    generator = _config(options, "generator", hand.num_joints)
+    evaluator = _config(options, "evaluator", hand.num_joints)
     count = evaluator.model.palm_points
     points = surface_points(hand, count) if count else None
     if processes.first:
