@@ -33,6 +33,7 @@ $(VENV)/.view: $(BIN)/python pyproject.toml constraints.txt
 
 $(VENV)/.dev: $(BIN)/python pyproject.toml constraints.txt
 	@$(PIP_INSTALL) -e ".[dev]" | $(PROGRESS)
+	@$(PIP_INSTALL) --no-deps dexterity==0.0.15 | $(PROGRESS)
 	@touch $@ $(VENV)/.demo $(VENV)/.view
 
 .PHONY: demo
