@@ -30,8 +30,8 @@ def test_train_distil_and_grasp(ffhnet, trained, tmp_path, depth_png):
     status, _, err = ffhnet(*distil, *FEW)
     assert (status, err) == (0, "")
     assert json.loads((small / "config.json").read_text())["model"]["flow_steps"] == 2
-    assert (small / "evaluator.safetensors").read_bytes() == (trained / "evaluator.safetensors").read_bytes()
-    assert (small / "generator.safetensors").stat().st_size < 0.7 * len(before)
+    for name in ("generator.safetensors", "evaluator.safetensors"):
+        assert (small / name).stat().st_size < 0.5 * (trained / name).stat().st_size
 
     for weights in (trained, small):
         out = tmp_path / "grasps.json"

@@ -1,11 +1,11 @@
-"""`ffhnet distil`: weights whose generator takes a tenth of the work per sample."""
+"""`ffhnet distil`: weights whose networks take a twentieth of the work."""
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -13,15 +13,22 @@ from ffhnet.apps.console import absent
 from ffhnet.apps.extras import require_sim
 from ffhnet.errors import OptionError, WeightsError
 
+if TYPE_CHECKING:
+    from ffhnet.model.config import ModelConfig
+    from ffhnet.training.config import Network, TrainingConfig
+
 
 @dataclass(frozen=True)
 class DistilOptions:
-    """Teach a small flow of two steps to end where a trained one ends; a run that was stopped goes on."""
+    """Teach small networks what trained ones know; a run that was stopped goes on.
+
+    A flow of two steps learns to end where that of `--weights` ends, an evaluator then to rate its grasps.
+    """
 
     data: Annotated[tuple[Path, ...], tyro.conf.Positional]
-    """Data sets, of which only the views are used."""
+    """Data sets; their trials teach the evaluator only."""
     weights: Path
-    """Trained weights with a flow as generator; their evaluator is taken over as it is."""
+    """Trained weights with a flow as generator."""
     out: Path
     """Folder of the new weights."""
     val: Annotated[Path | None, absent("DIR")] = None
@@ -29,7 +36,7 @@ class DistilOptions:
     guidance: float = 0.0
     """Weight of the evaluator's opinion: more samples succeed, but it judges them less well."""
     steps: Annotated[int | None, absent("N", "the preset's")] = None
-    """Optimiser steps."""
+    """Optimiser steps of each network."""
     seed: int = 0
     """Seed of initial weights, noise and batches."""
     threads: int = field(default_factory=lambda: os.cpu_count() or 1)
@@ -39,16 +46,14 @@ class DistilOptions:
 
 
 def run(options: DistilOptions) -> None:
-    """Distil, and write both networks."""
+    """Distil both networks, and write them."""
     require_sim("distil")
-    import dataclasses
-
     import torch
 
     from ffhnet.dataset.records import read_training_data
     from ffhnet.model.checkpoint import load_checkpoint
     from ffhnet.model.flow import FlowGenerator
-    from ffhnet.training import TrainingConfig, distill_generator
+    from ffhnet.training import distill_evaluator, distill_generator
     from ffhnet.training.processes import joined
 
     if options.threads < 1 or (options.steps is not None and options.steps < 1) or options.guidance < 0:
@@ -58,14 +63,26 @@ def run(options: DistilOptions) -> None:
     info = trained.info
     if not isinstance(trained.generator, FlowGenerator):
         raise WeightsError(f"wanted weights with a flow, {options.weights} holds a {info.model.generator}")
-    config = dataclasses.replace(TrainingConfig.default("student"), model=info.model.student())
-    config = dataclasses.replace(
-        config, steps=options.steps or config.steps, guidance=options.guidance, seed=options.seed
-    )
+    first, second = _config(options, "generator", info.model), _config(options, "evaluator", info.model)
     data = read_training_data(list(options.data))
     val = None if options.val is None else read_training_data([options.val])
     limits = (info.joint_lower, info.joint_upper)
     with joined(options.device) as processes:
-        distill_generator(
-            data, val, config, options.out, limits, trained.generator, trained.evaluator, processes=processes
+        student = distill_generator(
+            data, val, first, options.out, limits, trained.generator, trained.evaluator, processes=processes
         )
+        distill_evaluator(
+            data, val, second, options.out, limits, trained.evaluator, student, processes=processes
+        )
+
+
+def _config(options: DistilOptions, network: Network, teacher: ModelConfig) -> TrainingConfig:
+    """The preset's run of a network, with what the options change."""
+    import dataclasses
+
+    from ffhnet.training import TrainingConfig
+
+    config = TrainingConfig.distillation(network, teacher)
+    return dataclasses.replace(
+        config, steps=options.steps or config.steps, guidance=options.guidance, seed=options.seed
+    )

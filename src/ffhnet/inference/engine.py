@@ -90,12 +90,7 @@ class SeenObject:
         """What the generator's own `sample` gives for the same `source` (on the CPU), up to rounding."""
         noise = torch.randn(1, num, self.noise_width, generator=source)[0]
         noise = self.temperature * noise.to(self.device)
-        parts = [self.generate(rows) for rows in noise.split(CHUNK)]
-        return GraspTensors(
-            torch.cat([part.rotation for part in parts], dim=1),
-            torch.cat([part.position for part in parts], dim=1),
-            torch.cat([part.joints for part in parts], dim=1),
-        )
+        return GraspTensors.joined([self.generate(rows) for rows in noise.split(CHUNK)])
 
     @torch.inference_mode()
     def rate(self, grasps: GraspTensors) -> EvaluatorLogits:

@@ -49,6 +49,12 @@ class FFHEvaluator(nn.Module):
         self.dropout = nn.Dropout(config.dropout)
         self.head = nn.Linear(width, 3 if config.judge_robustness else 1)
 
+    def take_constants(self, other: FFHEvaluator) -> None:
+        """Take over what training does not change: projection, and its share of palm points."""
+        self.condition.load_state_dict(other.condition.state_dict())
+        if self.geometry is not None and other.geometry is not None:
+            self.geometry.take_points(other.geometry)
+
     def forward(self, objects: ObjectTensors, grasps: GraspTensors) -> EvaluatorLogits:
         """Logits of each grasp."""
         condition = self.condition_norm(self.condition(objects))

@@ -89,7 +89,7 @@ class FlowGenerator(nn.Module):
         self.mean.copy_(other.mean)
         self.deviation.copy_(other.deviation)
         if self.geometry is not None and other.geometry is not None:
-            self.geometry.points.copy_(other.geometry.points[: len(self.geometry.points)])
+            self.geometry.take_points(other.geometry)
 
     def loss(
         self,

@@ -94,6 +94,10 @@ class LocalGeometry(nn.Module):
         """Store the points (m, palm frame) at which the field is read."""
         self.points.copy_(torch.as_tensor(points))
 
+    def take_points(self, other: LocalGeometry) -> None:
+        """Take over the first points of another, which has as many or more."""
+        self.points.copy_(other.points[: len(self.points)])
+
     def forward(
         self, grid: Float[Tensor, "V 1 N N N"], objects: ObjectTensors, grasps: GraspTensors
     ) -> Float[Tensor, "V G F"]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -52,6 +53,15 @@ class GraspTensors:
     def to(self, device: torch.device) -> GraspTensors:
         """The same on another device."""
         return GraspTensors(self.rotation.to(device), self.position.to(device), self.joints.to(device))
+
+    @staticmethod
+    def joined(parts: Sequence[GraspTensors]) -> GraspTensors:
+        """The grasps of several batches of the same views, one after the other."""
+        return GraspTensors(
+            torch.cat([part.rotation for part in parts], dim=1),
+            torch.cat([part.position for part in parts], dim=1),
+            torch.cat([part.joints for part in parts], dim=1),
+        )
 
     def ungrouped(self) -> GraspTensors:
         """One grasp per view, V·G views: the partner of `ObjectTensors.repeat`."""

@@ -1,6 +1,13 @@
 """Training the networks from `TrainingData`."""
 
 from ffhnet.training.config import ClassShares, TrainingConfig
-from ffhnet.training.train import distill_generator, train_evaluator, train_generator
+from ffhnet.training.train import distill_evaluator, distill_generator, train_evaluator, train_generator
 
-__all__ = ["ClassShares", "TrainingConfig", "distill_generator", "train_evaluator", "train_generator"]
+__all__ = [
+    "ClassShares",
+    "TrainingConfig",
+    "distill_evaluator",
+    "distill_generator",
+    "train_evaluator",
+    "train_generator",
+]

@@ -31,13 +31,15 @@ class Batch:
     """What one training step sees.
 
     Attributes:
-        objects: V views.
+        views: which views of the data.
+        objects: the same as the networks see them.
         grasps: G grasps of each view's placement, in its view frame.
         label: success in nominal physics.
         robust: success under varied physics; NaN where unknown.
         collision: 1 where the start collided.
     """
 
+    views: Int[np.ndarray, " V"]
     objects: ObjectTensors
     grasps: GraspTensors
     label: Float[Tensor, "V G"]
@@ -47,6 +49,7 @@ class Batch:
     def to(self, device: torch.device) -> Batch:
         """The same on another device."""
         return Batch(
+            self.views,
             self.objects.to(device),
             self.grasps.to(device),
             self.label.to(device),
@@ -155,12 +158,18 @@ class BatchMaker:
         if moved.any():
             rotation[moved], position[moved] = hard_negatives(rng, rotation[moved], position[moved])
         return Batch(
-            objects=ObjectTensors(_tensor(data.bps[view]), _tensor(data.table_height[view])),
+            views=view,
+            objects=view_tensors(data, view),
             grasps=GraspTensors(_tensor(rotation), _tensor(position), _tensor(data.joints[trial])),
             label=_tensor(label),
             robust=_tensor(np.where(moved, np.nan, data.robust[trial])),
             collision=_tensor(np.where(moved, 0.0, ~data.executed[trial])),
         )
+
+
+def view_tensors(data: TrainingData, views: Int[np.ndarray, " V"]) -> ObjectTensors:
+    """Some views as the networks see them."""
+    return ObjectTensors(_tensor(data.bps[views]), _tensor(data.table_height[views]))
 
 
 def hard_negatives(

@@ -22,7 +22,8 @@ from ffhnet.model.generator import FFHGenerator
 from ffhnet.model.pca import fit_projection
 from ffhnet.training.batches import BatchMaker
 from ffhnet.training.config import TrainingConfig
-from ffhnet.training.distillation import DistillationTask
+from ffhnet.training.evaluator_distillation import EvaluatorDistillationTask
+from ffhnet.training.flow_distillation import FlowDistillationTask
 from ffhnet.training.loop import fit, seeded
 from ffhnet.training.processes import ALONE, Processes
 from ffhnet.training.tasks import EvaluatorTask, FlowTask, GeneratorTask, Task
@@ -88,7 +89,7 @@ def distill_generator(
     progress: bool = True,
     processes: Processes = ALONE,
 ) -> FlowGenerator:
-    """Distil the flow of `config.model` from a larger one (`distillation.py`), and write both networks.
+    """Distil the flow of `config.model` from a larger one (`flow_distillation.py`), and write it.
 
     Args:
         data: views to learn on.
@@ -97,7 +98,7 @@ def distill_generator(
         out_dir: as for `train_generator`.
         joint_limits: lower and upper limits in radians.
         teacher: a trained flow, which gives projection, statistics and palm points; it is not changed.
-        evaluator: trained; it guides, and is written beside the student unchanged.
+        evaluator: trained; it guides, and is not changed either.
         progress: show a progress bar.
         processes: as for `train_generator`.
     """
@@ -108,11 +109,49 @@ def distill_generator(
     part = dataclasses.replace(config, views=processes.share(config.views))
     lower, upper = (torch.tensor(limit, dtype=torch.float32) for limit in joint_limits)
     judge = copy.deepcopy(evaluator)
-    task = DistillationTask(module, teacher, judge, (lower, upper), part, data, val)
+    task = FlowDistillationTask(module, teacher, judge, (lower, upper), part, data, val)
     metrics = fit(task, config, out_dir, "generator", progress, processes)
     if processes.first:
         info = _info(data, config, joint_limits, "generator", metrics)
-        save_checkpoint(out_dir, info, generator=module, evaluator=evaluator, half=True)
+        save_checkpoint(out_dir, info, generator=module, half=True)
+    return module
+
+
+def distill_evaluator(
+    data: TrainingData,
+    val: TrainingData | None,
+    config: TrainingConfig,
+    out_dir: Path,
+    joint_limits: tuple[Sequence[float], Sequence[float]],
+    teacher: FFHEvaluator,
+    generator: FlowGenerator,
+    progress: bool = True,
+    processes: Processes = ALONE,
+) -> FFHEvaluator:
+    """Distil the evaluator of `config.model` from a larger one (`evaluator_distillation.py`), and write it.
+
+    Args:
+        data: views and trials to learn on.
+        val: held-out objects for metrics, or None.
+        config: architecture and run.
+        out_dir: as for `train_generator`.
+        joint_limits: lower and upper limits in radians.
+        teacher: a trained evaluator, which gives projection and palm points; it is not changed.
+        generator: the flow whose grasps the student will rate.
+        progress: show a progress bar.
+        processes: as for `train_generator`.
+    """
+    _check_data(data, config.model)
+    with seeded(config.seed):
+        module = FFHEvaluator(config.model).to(processes.device)
+    module.take_constants(teacher)
+    part = dataclasses.replace(config, views=processes.share(config.views))
+    lower, upper = (torch.tensor(limit, dtype=torch.float32) for limit in joint_limits)
+    task = EvaluatorDistillationTask(module, teacher, generator, (lower, upper), part, data, val)
+    metrics = fit(task, config, out_dir, "evaluator", progress, processes)
+    if processes.first:
+        info = _info(data, config, joint_limits, "evaluator", metrics)
+        save_checkpoint(out_dir, info, evaluator=module, half=True)
     return module
 
 

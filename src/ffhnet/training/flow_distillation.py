@@ -1,7 +1,9 @@
 """A flow of few steps learns to end where a larger one ends, and may then be guided by the evaluator.
 
 The *student* starts from the same noise as its *teacher* and shall be where the teacher is at the student's
-times (progressive distillation, Salimans and Ho 2022, with the student's own states as inputs). With guidance
+times (progressive distillation, Salimans and Ho 2022, with the student's own states as inputs). A path counts
+as much as the evaluator believes in the grasp at its end: from noise that leads the teacher to a failure, the
+student goes where its neighbours go. With guidance
 the evaluator joins in: its gradient with respect to the grasp moves samples away from collisions and towards
 grasps that hold, while the first loss keeps their variety. It also moves them to where the evaluator errs, so
 that what it says of the samples is worth less.
@@ -9,9 +11,11 @@ that what it says of the samples is worth less.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor
 from torch.nn import functional
 
@@ -20,6 +24,7 @@ from ffhnet.errors import OptionError
 from ffhnet.model.evaluator import FFHEvaluator
 from ffhnet.model.flow import FlowGenerator
 from ffhnet.model.tensors import GraspTensors, ObjectTensors
+from ffhnet.training.batches import view_tensors
 from ffhnet.training.config import TrainingConfig
 from ffhnet.training.loop import seeded
 
@@ -30,7 +35,7 @@ HELD_OUT_VIEWS, HELD_OUT_GRASPS = 128, 32
 """Size of the held-out measurement."""
 
 
-class DistillationTask:
+class FlowDistillationTask:
     """Learn a teacher's paths on the views of a data set, guided by an evaluator.
 
     Args:
@@ -63,21 +68,22 @@ class DistillationTask:
         self._lower, self._upper = (limit.to(self._device) for limit in joint_limits)
         self._data = data
         self._held_out = held_out
-        self._states = self._teach(teacher.to(self._device).eval())
+        self._teacher = teacher.to(self._device).eval()
 
     def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         """Distance to the teacher's states and, after the start, what the evaluator says of the grasps."""
+        all_states, all_beliefs = self._paths
         views = rng.choice(self._data.num_views, self.config.views)
         pairs = rng.choice(self.config.pairs, min(self.config.grasps, self.config.pairs), replace=False)
-        noise, *wanted = torch.from_numpy(self._states[views][:, :, pairs]).float().to(self._device).unbind(1)
+        states = torch.from_numpy(all_states[views][:, :, pairs]).float().to(self._device)
+        belief = torch.from_numpy(all_beliefs[views][:, pairs]).float().to(self._device)
         objects = self._objects(self._data, views)
-        reached = list(self.module.path(objects, noise))
-        distance = torch.stack(
-            [functional.mse_loss(x, goal) for x, goal in zip(reached, wanted, strict=True)]
-        ).mean()
+        reached = torch.stack(list(self.module.path(objects, states[:, 0])), dim=1)
+        off = (reached - states[:, 1:]).square().mean(dim=(1, 3))
+        distance = (belief * off).sum() / belief.sum()
         if self.config.guidance == 0 or step < self.config.guidance_start * self.config.steps:
             return distance, {"loss": distance.item(), "distance": distance.item()}
-        blame = self._blame(objects, reached[-1])
+        blame = self._doubt(objects, reached[:, -1]).mean()
         total = distance + self.config.guidance * blame
         return total, {"loss": total.item(), "distance": distance.item(), "blame": blame.item()}
 
@@ -90,38 +96,39 @@ class DistillationTask:
             views = rng.choice(self._held_out.num_views, HELD_OUT_VIEWS)
             objects = self._objects(self._held_out, views)
             *_, last = self.module.path(objects, self._noise(HELD_OUT_VIEWS, HELD_OUT_GRASPS))
-            blame = self._blame(objects, last).item()
+            blame = self._doubt(objects, last).mean().item()
         self.module.train()
         return {"blame": blame}
 
-    def _teach(self, teacher: FlowGenerator) -> Float[np.ndarray, "V K P S"]:
-        """Noise and the teacher's states at the student's times, P for each view."""
-        count, every = self._data.num_views, teacher.config.flow_steps // self.module.config.flow_steps
-        shape = (count, 1 + self.module.config.flow_steps, self.config.pairs, teacher.state_width)
-        states = np.empty(shape, np.float16)
+    @cached_property
+    def _paths(self) -> tuple[Float[np.ndarray, "V K P S"], Float[np.ndarray, "V P"]]:
+        """P paths for each view (noise, and the teacher at the student's times), and belief in their ends."""
+        steps, pairs = self.module.config.flow_steps, self.config.pairs
+        every = self._teacher.config.flow_steps // steps
+        count = self._data.num_views
+        states = np.empty((count, 1 + steps, pairs, self._teacher.state_width), np.float16)
+        belief = np.empty((count, pairs), np.float16)
         with torch.inference_mode(), seeded(self.config.seed):
             for first in range(0, count, CHUNK):
                 views = np.arange(first, min(first + CHUNK, count))
-                noise = self._noise(len(views), self.config.pairs)
-                path = list(teacher.path(self._objects(self._data, views), noise))[every - 1 :: every]
+                objects, noise = self._objects(self._data, views), self._noise(len(views), pairs)
+                path = list(self._teacher.path(objects, noise))[every - 1 :: every]
                 states[views] = torch.stack([noise, *path], dim=1).half().cpu().numpy()
-        return states
+                belief[views] = torch.exp(-self._doubt(objects, path[-1])).half().cpu().numpy()
+        return states, belief
 
     def _noise(self, views: int, grasps: int) -> Float[Tensor, "V G S"]:
         """What samples start from, as in use."""
         noise = torch.randn(views, grasps, self.module.state_width)
         return (self.module.config.temperature * noise).to(self._device)
 
-    def _blame(self, objects: ObjectTensors, states: Float[Tensor, "V G S"]) -> Float[Tensor, ""]:
-        """Mean negative logarithm of the probability that a grasp holds, over the evaluator's outputs."""
+    def _doubt(self, objects: ObjectTensors, states: Float[Tensor, "V G S"]) -> Float[Tensor, "V G"]:
+        """Negative logarithm of the probability that a grasp holds, mean over the evaluator's outputs."""
         raw = self.module.grasps(states)
         grasps = GraspTensors(raw.rotation, raw.position, raw.joints.clamp(self._lower, self._upper))
         logits = self._evaluator(objects, grasps)
         outputs = [logits.success] if logits.robust is None else [logits.success, logits.robust]
-        return torch.stack([functional.softplus(-output).mean() for output in outputs]).mean()
+        return torch.stack([functional.softplus(-output) for output in outputs]).mean(dim=0)
 
-    def _objects(self, data: TrainingData, views: np.ndarray) -> ObjectTensors:
-        def tensor(array: np.ndarray) -> Tensor:
-            return torch.from_numpy(array[views].astype(np.float32)).to(self._device)
-
-        return ObjectTensors(tensor(data.bps), tensor(data.table_height))
+    def _objects(self, data: TrainingData, views: Int[np.ndarray, " V"]) -> ObjectTensors:
+        return view_tensors(data, views).to(self._device)
