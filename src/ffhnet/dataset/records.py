@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from jaxtyping import Bool, Float, Int
 
+from ffhnet.dataset.parquet import read_table, table_bytes
 from ffhnet.dataset.training_data import TrainingData
 from ffhnet.errors import DatasetError
 from ffhnet.files import write_atomically
@@ -27,9 +27,6 @@ from ffhnet.grasps import Grasps
 from ffhnet.simulation.trial import Outcome, TrialResults
 
 FORMAT = 2
-_FEW_ROWS = 100_000
-"""Rows that may be of any size: made-up data compresses well."""
-
 PROPOSERS = ("heuristic", "power", "perturb", "learned")
 
 
@@ -140,9 +137,7 @@ def views_table(object_name: str, blocks: list[ViewBlock]) -> pa.Table:
 def write_table(table: pa.Table, path: Path) -> None:
     """Writes a Parquet file so that it is there whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    buffer = pa.BufferOutputStream()
-    pq.write_table(table, buffer, compression="zstd", compression_level=9, write_page_checksum=True)
-    write_atomically(path, buffer.getvalue().to_pybytes())
+    write_atomically(path, table_bytes(table))
 
 
 def write_header(folder: Path, header: dict[str, Any]) -> None:
@@ -187,25 +182,9 @@ def read_tables(folder: Path, kind: str) -> pa.Table:
     if not files:
         raise DatasetError(f"{folder} holds no {kind}")
     try:
-        return pa.concat_tables([_read_table(file) for file in files]).unify_dictionaries()
+        return pa.concat_tables([read_table(file) for file in files]).unify_dictionaries()
     except pa.ArrowException as error:
         raise DatasetError(f"{folder}: the files of {kind} do not go together ({error})") from error
-
-
-def _read_table(file: Path) -> pa.Table:
-    """All rows of a file, their checksums compared where it has any. Raises DatasetError."""
-    try:
-        _check_rows(pq.read_metadata(file).num_rows, file)
-        return pq.read_table(file, page_checksum_verification=True)
-    except (OSError, pa.ArrowException) as error:
-        raise DatasetError(f"{file} is damaged ({error})") from error
-
-
-def _check_rows(rows: int, file: Path) -> None:
-    """Raises DatasetError where a file is small for its rows: written to fill the memory of who reads it."""
-    size = file.stat().st_size
-    if rows > max(size, _FEW_ROWS):
-        raise DatasetError(f"{file} has {rows} rows in {size} bytes: no trials or views are that small")
 
 
 @contextlib.contextmanager
