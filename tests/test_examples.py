@@ -38,8 +38,13 @@ def test_notebook_draws_its_pictures():
     notebook = nbformat.read(FOLDER / "pictures.ipynb", as_version=4)
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]
     assert not any(cell.outputs or cell.execution_count for cell in code), "stored without outputs"
+    # A busy machine brings outputs late; by default those of more than four seconds are lost.
     nbclient.NotebookClient(
-        notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(FOLDER)}}
+        notebook,
+        timeout=600,
+        iopub_timeout=600,
+        kernel_name="python3",
+        resources={"metadata": {"path": str(FOLDER)}},
     ).execute()
     kinds = [kind for cell in code for output in cell.outputs for kind in output.get("data", ())]
     assert kinds.count("image/png") == 4
