@@ -26,12 +26,12 @@ import tyro
 
 from ffhnet.apps.console import absent, print_table
 
-TESTS = Path(__file__).parents[1] / "tests"
-sys.path.append(str(TESTS / "robustness"))
+sys.path.append(str(Path(__file__).parents[1] / "tests" / "robustness"))
 
 from injections import contents, fill_disk, flip_bit
 from writers import CHECKED, WRITERS
 
+TESTS = Path(__file__).parents[1] / "tests"
 COMMAND = "from ffhnet.apps.cli import main; main()"
 JUMPS = """
 import random, time
