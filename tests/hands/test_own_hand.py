@@ -8,8 +8,9 @@ import pytest
 
 from ffhnet.apps import cli
 from ffhnet.apps.hand_option import for_workers
-from ffhnet.errors import OptionError
-from ffhnet.hands import load_hand
+from ffhnet.errors import OptionError, WeightsError
+from ffhnet.hands import DEFAULT_HAND, load_hand
+from ffhnet.inference.ffhnet import find_weights
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "data"
 DEPTH = EXAMPLES / "jar_2000004_depth.png"
@@ -52,6 +53,12 @@ def test_check_finds_nothing_in_the_example(folder, capsys):
 def test_another_hand_than_that_of_the_data_is_refused(folder):
     with pytest.raises(OptionError, match="for 'dlr_hit_ii'"):
         for_workers(str(folder / "hand.toml"), "dlr_hit_ii")
+
+
+def test_no_weights_ship_for_a_hand_of_ones_own():
+    with pytest.raises(WeightsError, match="no weights for the hand 'three_fingers'"):
+        find_weights(None, "three_fingers")
+    assert find_weights(None, DEFAULT_HAND) == find_weights(None)
 
 
 def test_from_data_to_grasps(folder, tmp_path, capsys, monkeypatch):

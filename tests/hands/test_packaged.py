@@ -171,12 +171,29 @@ def test_what_is_written_is_what_a_hand_needs(claw):
         ('name="curl"', 'name="curl" pos="0 0 0.01"', "only hinge, at its origin"),
         ('name="curl" axis="1 0 0" range="-90 0"', 'name="curl" axis="1 0 0" range="-9 0"', "index_pip goes"),
         ('name="thumb"', 'name="pollex"', "no joint thumb"),
+        ('pos="0 -0.03 0"', 'pos="0 0 0"', "where is its tip"),
         ('pos="0 -0.03 0" size="0.01"', 'type="ellipsoid" size="0.01 0.02 0.03"', "type ellipsoid"),
     ],
 )
 def test_a_model_that_cannot_be_used_says_why(claw, old, new, said):
     change(claw, old, new)
     with pytest.raises(HandError, match=said):
+        load(claw)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('joints.thumb = { mcp = "thumb" }', 'joints.thumb = "thumb"'),
+        ('mcp = "thumb"', "mcp = 3"),
+        ("torque = 0.8", "strength = 0.8"),
+        ('["mcp", 0.5]', "0.5"),
+        ('name = "claw_models"', ""),
+    ],
+)
+def test_a_malformed_section_is_refused(claw, old, new):
+    change(claw.parents[1], old, new, "hand.toml")
+    with pytest.raises(HandError, match="missing or malformed"):
         load(claw)
 
 

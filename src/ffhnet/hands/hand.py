@@ -164,7 +164,7 @@ def load_hand(name_or_toml: str = DEFAULT_HAND) -> Hand:
         raise HandError(f"cannot read the hand description {path}: {error}") from error
     try:
         hand = _from_description(description, path.parent)
-    except (KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise HandError(
             f"{path}: a field is missing or malformed ({type(error).__name__}: {error})"
         ) from error
@@ -180,7 +180,8 @@ def _from_description(description: dict[str, Any], folder: Path) -> Hand:
         joint_names, mjcf, converted = tuple(description["joint_order"]), folder / description["model"], None
         check_inside(folder, Path(description["model"]))
     closing = description["closing"]
-    unknown = set(closing["joints"]) - set(joint_names)
+    closes = {name: {name, name.rpartition("_")[2]} & set(closing["joints"]) for name in joint_names}
+    unknown = set(closing["joints"]).difference(*closes.values())
     if unknown:
         raise HandError(f"closing.joints names unknown joints: {', '.join(sorted(unknown))}")
     palm = description["palm"]
@@ -194,7 +195,7 @@ def _from_description(description: dict[str, Any], folder: Path) -> Hand:
         eigengrasp_origin=np.array(description["eigengrasps"]["origin"], dtype=float),
         eigengrasps=np.array(description["eigengrasps"]["directions"], dtype=float),
         closing=ClosingMotion(
-            moves=np.array([float(name in closing["joints"]) for name in joint_names]),
+            moves=np.array([float(bool(closes[name])) for name in joint_names]),
             speed=float(closing["speed"]),
             lead=float(closing["lead"]),
             duration=float(closing["duration"]),

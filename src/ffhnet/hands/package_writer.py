@@ -155,7 +155,10 @@ class _Writer:
     def _tip(self, finger: str, element: ET.Element, geoms: list[int]) -> None:
         """A site where the last link reaches farthest from its joint, in the direction of its middle."""
         middles = self._model.geom_pos[geoms]
-        direction = middles.mean(axis=0) / np.linalg.norm(middles.mean(axis=0))
+        middle = middles.mean(axis=0)
+        if np.linalg.norm(middle) < _SPECK:
+            raise HandError(f"the last link of the {finger} finger lies around its joint: where is its tip?")
+        direction = middle / np.linalg.norm(middle)
         reach = max(middles @ direction + [self._extent(geom, direction) for geom in geoms])
         element.insert(1, ET.Element("site", name=f"{finger}_tip", pos=_text(reach * direction)))
 

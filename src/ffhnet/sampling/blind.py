@@ -43,7 +43,8 @@ class BlindConfig:
         reference: point of the palm frame (m) in the hollow of the hand.
         depth: m of that point below the object's top.
         clearance: m that the open hand keeps from cloud and table along its way.
-        weights: of the hand's eigengrasps, the shape that it closes to first.
+        weights: of the hand's eigengrasps, the shape that it closes to first; of a hand with fewer the first
+            ones, of one with more the others are zero.
     """
 
     tilt: float = 0.1
@@ -127,7 +128,8 @@ def _wraps(
     config: BlindConfig,
 ) -> Grasps:
     """`yaw` is the direction in which the palm's z axis points, from thumb to fingers."""
-    joints = hand.eigengrasp_origin + np.array(config.weights) @ hand.eigengrasps
+    used = hand.eigengrasps[: len(config.weights)]
+    joints = hand.eigengrasp_origin + np.array(config.weights[: len(used)]) @ used
     joints = np.clip(joints, hand.lower, hand.upper)
     upright = matrix_from_euler_xyz(np.array([0.0, np.pi / 2 - config.tilt, 0.0]))
     rotation = np.stack([about_z(angle) for angle in yaw]) @ upright
