@@ -50,23 +50,23 @@ class NearestGrid:
         nearest, (_, ny, nz) = np.zeros(np.prod(cells.shape), dtype=np.int32), cells.shape
         numbers = np.arange(1, len(means) + 1, dtype=np.int32)
         # Far cells are written first, so that the nearest stays.
-        for x, y, z in _ball(reach / cell):
-            nearest[cells.occupied + ((x * ny + y) * nz + z)] = numbers
+        x, y, z = _ball(reach / cell).T
+        steps = (x * ny + y) * nz + z
+        nearest[(steps[:, None] + cells.occupied).ravel()] = np.tile(numbers, len(steps))
         return cls(means, cells.source, cell, cells.origin, cells.shape, nearest)
 
     def look_up(
         self, places: Float[np.ndarray, "3 K"]
     ) -> tuple[Int[np.ndarray, " H"], Int[np.ndarray, " H"]]:
         """Which places (m, one row per axis) have a point within reach, and the index of the nearest."""
-        left = np.arange(places.shape[1])
-        index: np.ndarray = np.zeros(1, dtype=np.int32)
-        for axis, size in enumerate(self.shape):
-            scaled = (places[axis][left] - self.origin[axis]) * np.float32(1 / self.cell)
-            inside = (scaled >= 0) & (scaled < size)
-            left = left[inside]
-            index = (index * np.int32(size) + scaled.astype(np.int32))[inside]
-        found = self.nearest[index]
-        return left[found > 0], found[found > 0] - 1
+        scaled = (places - self.origin[:, None]) * np.float32(1 / self.cell)
+        inside = (scaled >= 0) & (scaled < np.array(self.shape, dtype=np.float32)[:, None])
+        left = np.flatnonzero(inside.all(axis=0))
+        x, y, z = scaled.take(left, axis=1).astype(np.int32)
+        _, ny, nz = self.shape
+        found = self.nearest.take((x * ny + y) * nz + z)
+        hit = np.flatnonzero(found)
+        return left.take(hit), found.take(hit) - 1
 
 
 @dataclass(frozen=True)
@@ -103,11 +103,11 @@ class Cells:
 
 
 @lru_cache(maxsize=8)
-def _ball(radius: float) -> list[tuple[int, int, int]]:
+def _ball(radius: float) -> Int[np.ndarray, "S 3"]:
     """Steps to all cells within a radius (in cells), far ones first."""
     reach = int(np.ceil(radius))
     steps = np.stack(np.meshgrid(*[np.arange(-reach, reach + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     length = np.linalg.norm(steps, axis=1)
     kept = np.argsort(-length, kind="stable")
     kept = kept[length[kept] <= radius + 0.5]
-    return [(int(x), int(y), int(z)) for x, y, z in steps[kept]]
+    return steps[kept]
