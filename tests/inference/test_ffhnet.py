@@ -66,7 +66,7 @@ def test_grasps_are_ranked_and_complete(net: FFHNet, view: View):
 
 
 def test_joints_are_clipped_to_the_limits(net: FFHNet, view: View):
-    joints = net.grasp(view, num=300).joints
+    joints = net.grasp(view, num=3000).joints
     assert (joints >= INFO.joint_lower).all()
     assert (joints <= INFO.joint_upper).all()
     assert (joints == INFO.joint_upper).any()

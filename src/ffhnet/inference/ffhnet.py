@@ -222,7 +222,9 @@ def find_weights(path_or_name: str | Path | None, hand: str | None = None) -> Pa
         MissingExtraError: it can only be a repository, and the extra `hub` is not installed.
     """
     if path_or_name is None:
-        folder = shipped_weights() if hand in (None, DEFAULT_HAND) else shipped_weights() / str(hand)
+        if hand in (None, DEFAULT_HAND):
+            return shipped_weights()
+        folder = shipped_weights() / str(hand)
         if not folder.is_dir():
             raise WeightsError(
                 f"no weights for the hand {hand!r} come with the package: name a folder of them"

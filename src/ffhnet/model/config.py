@@ -53,7 +53,7 @@ class ModelConfig:
     joint_scale: float = 0.5
     height_scale: float = 0.1
     generator: Literal["cvae", "flow"] = "flow"
-    temperature: float = 0.85
+    temperature: float = 0.7
     latent: int = 5
     inner_width: int = 256
     width: int = 512
