@@ -25,7 +25,7 @@ from ffhnet.training.config import TrainingConfig
 from ffhnet.training.loop import seeded
 from ffhnet.training.tasks import EvaluatorTask
 
-CHUNK = 16
+CHUNK = 64
 """Views whose grasps the teacher rates at once."""
 
 HELD_OUT_VIEWS = 128

@@ -28,7 +28,7 @@ from ffhnet.training.batches import view_tensors
 from ffhnet.training.config import TrainingConfig
 from ffhnet.training.loop import seeded
 
-CHUNK = 16
+CHUNK = 64
 """Views whose paths the teacher computes at once."""
 
 HELD_OUT_VIEWS, HELD_OUT_GRASPS = 128, 32
