@@ -117,7 +117,7 @@ def _inference(
     factors = {
         "the paper's networks, published way": "times_faster_than_published",
         "its own plain modules": "times_faster_than_plain",
-        "the published way, with networks of the distilled size": "distilled_size_times_faster_than_published",
+        "the published way, at the size of distil": "distilled_size_times_faster_than_published",
     }
     rows = [[name, f"{figures[key]:.2f}"] for name, key in factors.items()]
     print_table("The engine", ("against", "times as fast"), rows)
