@@ -17,14 +17,14 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
-from ffhnet.apps.console import absent, print_table
+from ffhnet.apps.console import absent
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "robustness"))
 
@@ -77,54 +77,53 @@ class Options:
 
 
 def main(options: Options) -> None:
-    chance = random.Random(options.seed)
+    report = {}
     with tempfile.TemporaryDirectory() as place:
-        root = Path(place)
-        report = full_disks(root) | turned_bits(root, options.flips, chance)
-        jobs: dict[str, Start] = {
-            "training": lambda out, before: train(out, options.steps, before),
-            "evaluation": evaluate,
-        }
-        for (name, start), kills in zip(jobs.items(), (options.kills, options.kills // 2), strict=True):
-            usual, seconds = undisturbed(root / f"{name} alone", start)
-            report[f"kill -9 of {name}"] = killed(root / name, start, usual, seconds, kills, chance)
-            report[f"clock that jumps in {name}"] = jumped(root / f"{name} jumps", start, usual)
-            if name == "training":
-                report["two trainings in one folder"] = together(root / "two", start, usual, options.pairs)
-    rows = [
-        [name, str(sum(c.values())), ", ".join(f"{n} {k}" for k, n in c.items())]
-        for name, c in report.items()
-    ]
-    print_table("Faults", ("fault", "injected", "what came of it"), rows)
+        for name, counts in injected(Path(place), options):
+            report[name] = counts
+            print(f"{name}: {', '.join(f'{number} {what}' for what, number in counts.items())}", flush=True)
     if options.json is not None:
         options.json.write_text(json.dumps(report, indent=1) + "\n")
     good = {"refused", "found", "harmless", "the same files", "one refused, the other the same files"}
     sys.exit(int(any(outcome not in good for counts in report.values() for outcome in counts)))
 
 
-def full_disks(root: Path) -> dict[str, Counter[str]]:
+def injected(root: Path, options: Options) -> Iterator[tuple[str, Counter[str]]]:
+    """One kind of fault after the other, with what came of it and how often."""
+    chance = random.Random(options.seed)
+    yield from full_disks(root)
+    yield from turned_bits(root, options.flips, chance)
+    jobs: dict[str, Start] = {
+        "training": lambda out, before: train(out, options.steps, before),
+        "evaluation": evaluate,
+    }
+    for (name, start), kills in zip(jobs.items(), (options.kills, options.kills // 2), strict=True):
+        usual, seconds = undisturbed(root / f"{name} alone", start)
+        yield f"clock that jumps in {name}", jumped(root / f"{name} jumps", start, usual)
+        if name == "training":
+            yield "two trainings in one folder", together(root / "two", start, usual, options.pairs)
+        yield f"kill -9 of {name}", killed(root / name, start, usual, seconds, kills, chance)
+
+
+def full_disks(root: Path) -> Iterator[tuple[str, Counter[str]]]:
     """Every writer where a file may take up 0 to 99 % of what it needs."""
-    report = {}
     for writer in WRITERS:
         folder = root / f"full {writer.name}"
         folder.mkdir()
         writer.write(folder)
         shares = [k / 20 for k in range(20)] + [0.99]
-        report[f"full disk: {writer.name}"] = Counter(fill_disk(writer, folder, share) for share in shares)
-    return report
+        yield f"full disk: {writer.name}", Counter(fill_disk(writer, folder, share) for share in shares)
 
 
-def turned_bits(root: Path, flips: int, chance: random.Random) -> dict[str, Counter[str]]:
+def turned_bits(root: Path, flips: int, chance: random.Random) -> Iterator[tuple[str, Counter[str]]]:
     """Every file that has checksums, with one bit turned at a time."""
-    report = {}
     for writer in CHECKED:
         folder = root / f"bits {writer.name}"
         folder.mkdir()
         writer.write(folder)
         for name in writer.files:
             outcomes = (flip_bit(writer, folder, name, chance) for _ in range(flips))
-            report[f"turned bit: {writer.name}, {Path(name).name}"] = Counter(outcomes)
-    return report
+            yield f"turned bit: {writer.name}, {Path(name).name}", Counter(outcomes)
 
 
 def train(out: Path, steps: int, before: str) -> subprocess.Popen:
