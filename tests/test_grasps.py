@@ -34,6 +34,13 @@ def test_ranked_is_best_first_and_keeps_rows_together():
         batch(probability=False).ranked()
 
 
+def test_robustness_ranks_where_it_is_known():
+    grasps = batch()
+    other = grasps.replace(robustness=1 - grasps.probability)
+    np.testing.assert_array_equal(other.score, 1 - grasps.probability)
+    np.testing.assert_array_equal(other.ranked().position[0], grasps.position[np.argmin(grasps.probability)])
+
+
 def test_slices_are_batches():
     grasps = batch()
     assert len(grasps[2]) == 1
@@ -51,6 +58,15 @@ def test_change_of_frame_there_and_back():
     back = moved.to_frame(invert(T), "world")
     np.testing.assert_allclose(back.position, grasps.position, atol=1e-12)
     np.testing.assert_allclose(back.rotation, grasps.rotation, atol=1e-12)
+
+
+def test_a_grasp_goes_where_its_frame_goes():
+    """A quarter turn about z takes x to y; then everything moves by (1, 2, 3)."""
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    grasps = batch(1).replace(position=np.array([[10.0, 20.0, 30.0]]), rotation=np.eye(3)[None])
+    moved = grasps.to_frame(make_transform(quarter, np.array([1.0, 2.0, 3.0])), "camera")
+    np.testing.assert_allclose(moved.position, [[-19.0, 12.0, 33.0]])
+    np.testing.assert_allclose(moved.rotation, quarter[None])
 
 
 def test_concatenate_refuses_mixtures():
