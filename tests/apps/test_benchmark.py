@@ -48,7 +48,7 @@ def speed(ffhnet, untrained_weights, tmp_path, monkeypatch):
 def test_report_of_the_networks(speed):
     printed, report = speed("inference", "gpu")
     inference = report["inference"]
-    assert min(inference[name] for name in ("published_ms", "plain_ms", "engine_ms")) > 0
+    assert min(inference[name] for name in ("published_ms", "plain_ms", "engine_ms", "realtime_ms")) > 0
     assert inference["reduced_ms"] is None
     assert "skipped" in printed
     assert 0 <= inference["largest_difference"] < 1e-4
@@ -59,12 +59,14 @@ def test_report_of_the_networks(speed):
 
 def test_report_of_perception_and_training(speed):
     _, report = speed("perception", "training")
-    assert set(report["inference"]) == {"bps_ms", "whole_ms"}
-    assert report["inference"]["whole_ms"] > report["inference"]["bps_ms"] > 0
-    assert (
-        report["perception"]["depth_to_observation_ms"] > report["perception"]["stages"]["plane"]["fastest"]
-    )
-    assert [row["points"] for row in report["perception"]["encodings"]] == [60]
+    inference, perception = report["inference"], report["perception"]
+    assert set(inference) == {"bps_ms", "whole_ms", "realtime_whole_ms"}
+    assert min(inference["whole_ms"], inference["realtime_whole_ms"]) > inference["bps_ms"] > 0
+    assert [row["weights"] for row in perception["tracking"]] == ["engine"] * 4 + ["realtime"] * 4
+    stages = perception["stages"]
+    assert perception["depth_to_observation_ms"] > stages["plane"]["fastest"]
+    assert stages["realtime: depth_to_feasible"]["fastest"] > stages["depth_to_observation"]["fastest"]
+    assert [row["points"] for row in perception["encodings"]] == [60]
     assert min(report["training"].values()) > 0
 
 

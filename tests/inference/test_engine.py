@@ -13,7 +13,7 @@ from ffhnet.geometry.rotations import rotation_from_6d
 from ffhnet.inference import engine as engine_module
 from ffhnet.inference.distance_grid import GridMaker, PalmReader
 from ffhnet.inference.engine import Engine
-from ffhnet.inference.ffhnet import shipped_weights
+from ffhnet.inference.ffhnet import REALTIME, find_weights
 from ffhnet.model import CheckpointInfo, FFHEvaluator, FFHGenerator, GraspTensors, ModelConfig, ObjectTensors
 from ffhnet.model.checkpoint import Checkpoint, load_checkpoint
 from ffhnet.model.flow import FlowGenerator
@@ -136,8 +136,9 @@ def test_same_answers_as_the_plain_modules(name: str):
         assert_same_answers(checkpoint, make_objects(CONFIGS[name], seed), num=70)
 
 
-def test_same_answers_with_the_packages_weights():
-    checkpoint = load_checkpoint(shipped_weights())
+@pytest.mark.parametrize("weights", [None, REALTIME])
+def test_same_answers_with_the_packages_weights(weights: str | None):
+    checkpoint = load_checkpoint(find_weights(weights))
     angle, height = torch.linspace(-1.6, 1.6, 30), torch.linspace(-0.07, 0.07, 20)
     x, y = -0.035 * angle.cos(), 0.035 * angle.sin()
     cylinder = torch.stack([x.repeat(20), y.repeat(20), height.repeat_interleave(30)], dim=-1)

@@ -58,7 +58,7 @@ class NetworkOptions:
     seed: int = 0
     """Same seed, same grasps."""
     weights: Annotated[Path | None, absent("DIR", "those that come with the package")] = None
-    """Folder of trained weights."""
+    """Folder of trained weights, or "realtime": small networks that come with the package, too."""
     hand: Annotated[str | None, absent("NAME", "the one that the weights are for")] = None
     """Name or TOML file of the hand."""
 

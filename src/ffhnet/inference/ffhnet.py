@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 VIEW_FRAME = "view"
 
+REALTIME = "realtime"
+"""Name of shipped weights whose networks take a thirtieth of the multiplications (`ffhnet distil`)."""
+
 _FARTHEST = 10.0
 """m: an observation of something farther off than this was made of stray points."""
 

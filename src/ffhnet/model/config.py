@@ -111,7 +111,7 @@ class ModelConfig:
         )
 
     def student(self) -> ModelConfig:
-        """The same with networks that take a twentieth of the work, to be distilled from this one's.
+        """The same with networks of a thirtieth of the multiplications, to be distilled from this one's.
 
         Without dropout, which keeps networks from learning trials by heart: a teacher rates any number.
         """

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import resource
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -19,7 +19,6 @@ from ffhnet.inference.engine import Engine
 from ffhnet.model.checkpoint import Checkpoint
 from ffhnet.model.config import ModelConfig
 from ffhnet.model.evaluator import EvaluatorLogits, FFHEvaluator
-from ffhnet.model.flow import FlowGenerator
 from ffhnet.model.generator import FFHGenerator
 from ffhnet.model.tensors import GraspTensors, ObjectTensors
 
@@ -70,16 +69,6 @@ def fast(engine: Engine, objects: ObjectTensors, num: int) -> Way:
     return Way(generate, lambda grasps: seen[0].rate(grasps))
 
 
-def small(trained: Checkpoint) -> Checkpoint:
-    """Untrained networks of the size that `ffhnet distil` makes."""
-    config = trained.info.model.student()
-    flow, evaluator = FlowGenerator(config).eval(), FFHEvaluator(config).eval()
-    evaluator.take_constants(trained.evaluator)
-    if isinstance(trained.generator, FlowGenerator):
-        flow.take_constants(trained.generator)
-    return Checkpoint(replace(trained.info, model=config), flow, evaluator)
-
-
 def largest_difference(checkpoint: Checkpoint, objects: ObjectTensors, num: int) -> float:
     """Between engine and modules: of poses (m, rad) from the same noise, and of probabilities."""
     wanted, logits = plain(checkpoint, objects, num)()
@@ -94,22 +83,21 @@ def largest_difference(checkpoint: Checkpoint, objects: ObjectTensors, num: int)
 
 @torch.inference_mode()
 def measure_networks(
-    checkpoint: Checkpoint, objects: ObjectTensors, num: int, clock: Clock
+    checkpoint: Checkpoint, realtime: Checkpoint, objects: ObjectTensors, num: int, clock: Clock
 ) -> tuple[dict[str, Times], dict[str, Any]]:
     """Times of all ways, and figures of the contract: medians, factors, the largest difference."""
-    engine, student = Engine(checkpoint), small(checkpoint)
+    engines = {"engine": Engine(checkpoint), "realtime": Engine(realtime)}
     ways = {
         "published": published(objects, num),
         "plain": plain(checkpoint, objects, num),
-        "engine": fast(engine, objects, num),
-        "engine_distilled_size": fast(Engine(student), objects, num),
+        **{name: fast(engine, objects, num) for name, engine in engines.items()},
     }
-    grasps = ways["engine"].generate()
-    stages: dict[str, Callable[[], object]] = {
-        "look": partial(engine.look, objects),
-        "generate": partial(engine.look(objects).sample, num, _source()),
-        "evaluate": partial(engine.look(objects).rate, grasps),
-    }
+    stages: dict[str, Callable[[], object]] = {}
+    for name, engine in engines.items():
+        seen = engine.look(objects)
+        stages[f"{name}: look"] = partial(engine.look, objects)
+        stages[f"{name}: generate"] = partial(seen.sample, num, _source())
+        stages[f"{name}: evaluate"] = partial(seen.rate, ways[name].generate())
     times = clock.in_turns({**ways, **stages})
     slow = times["published"]
     figures = {
@@ -118,8 +106,10 @@ def measure_networks(
         "reduced_skipped": NO_REDUCED,
         "times_faster_than_published": times["engine"].times_faster(slow),
         "times_faster_than_plain": times["engine"].times_faster(times["plain"]),
-        "distilled_size_times_faster_than_published": times["engine_distilled_size"].times_faster(slow),
-        "largest_difference": largest_difference(checkpoint, objects, num),
+        "realtime_times_faster_than_published": times["realtime"].times_faster(slow),
+        "largest_difference": max(
+            largest_difference(weights, objects, num) for weights in (checkpoint, realtime)
+        ),
     }
     return times, figures
 
