@@ -70,6 +70,13 @@ def test_a_wall_that_was_seen_is_in_the_way(planned):
     assert (reason[before] == Reason.ARM_COLLISION).all()
 
 
+def test_no_grasps_are_no_ways():
+    observation = observe(tube())
+    arm = ArmCheck(load_hand(), base_of(observation))
+    reason, motion = arm.plan(to_camera(AROUND)[:0], observation, arm.look(observation))
+    assert len(reason) == len(motion.approach) == len(motion.lift) == 0
+
+
 def test_nobody_reaches_three_metres():
     observation = observe(tube())
     arm = ArmCheck(load_hand(), Base(3.0, 3.0, 0.0, 0.0))

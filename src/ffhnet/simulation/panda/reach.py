@@ -125,7 +125,8 @@ class PandaReach:
         approach = flange_pose(T_world_palm @ self._approach @ T_palm_root)
         lift = flange_pose(self._lift @ T_world_palm @ T_palm_root)
 
-        solutions = inverse(approach[:, -1]).reshape(len(grasps), -1, 7)
+        solutions = inverse(approach[:, -1])
+        solutions = solutions.reshape(len(grasps), solutions.shape[1] * solutions.shape[2], 7)
         start = self._promising(solutions)
         path = np.concatenate([_walk(start, approach[:, ::-1])[:, :, ::-1], _walk(start, lift)], axis=2)
         jumps = np.abs(np.diff(path, axis=2)).max(axis=(2, 3))
@@ -202,4 +203,4 @@ def _walk(
         arrived = reaches(q[going], wanted)
         going = going[arrived]
         path[going, p] = q[going]
-    return path.reshape(*start.shape[:2], -1, 7)
+    return path.reshape(*start.shape[:2], *path.shape[1:])
