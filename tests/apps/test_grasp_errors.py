@@ -98,7 +98,7 @@ def test_depth_without_intrinsics(ffhnet, depth_png):
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
-        (("--hand", "shadow"), "shadow"),
+        (("--hand", "no_such_hand"), "no_such_hand"),
         (("--hand", "nothing.toml"), "nothing.toml"),
         (("--weights", "nowhere"), "nowhere"),
         (("--up", 0, 0, 1), "not both"),

@@ -11,7 +11,7 @@ from ffhnet.inference import FFHNet
 
 viser = pytest.importorskip("viser", reason="the viewer needs the extra `viewer`")
 
-EXAMPLE = "thin_box_2000008"
+EXAMPLE = "spray_flask_2000005"
 
 
 @pytest.fixture(scope="module")

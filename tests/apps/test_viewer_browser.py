@@ -40,7 +40,7 @@ def viewer():
         looker = Looker(FFHNet.from_pretrained(), hand, NetworkOptions(num=60))
         viewer = Viewer(server, hand, looker)
     server.scene.configure_default_lights(cast_shadow=False)
-    viewer.panel.example.value = "thin_box_2000008"
+    viewer.panel.example.value = "spray_flask_2000005"
     viewer.server = server
     yield viewer
     server.stop()
