@@ -70,12 +70,11 @@ def _config(options: TrainOptions, network: Network, num_joints: int) -> Trainin
     import dataclasses
 
     from ffhnet.training.config import TrainingConfig
-    from ffhnet.training.small import small_training
 
     if options.preset == "paper":
         config = TrainingConfig.paper(num_joints)
     elif options.preset == "small":
-        config = small_training(network, num_joints)
+        config = TrainingConfig.small(network, num_joints)
     else:
         config = TrainingConfig.default(network, num_joints)
     model = dataclasses.replace(config.model, generator=options.generator or config.model.generator)

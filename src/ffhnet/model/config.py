@@ -94,6 +94,20 @@ class ModelConfig:
         return cls(num_joints=num_joints)
 
     @classmethod
+    def small(cls, num_joints: int = 15) -> ModelConfig:
+        """The default at less than half its widths, for another hand: both files take less than 3 MB."""
+        return cls(
+            num_joints=num_joints,
+            pca_components=48,
+            inner_width=96,
+            width=192,
+            palm_points=64,
+            flow_width=192,
+            flow_blocks=3,
+            flow_palm_points=64,
+        )
+
+    @classmethod
     def paper(cls, num_joints: int = 15) -> ModelConfig:
         """Section III with the sizes of the public code: raw BPS, input batch norm, no table height."""
         return cls(

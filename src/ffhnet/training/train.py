@@ -71,10 +71,7 @@ def train_generator(
     else:
         module = initial_network(FFHGenerator, data, config, palm_points).to(processes.device)
         task = GeneratorTask(module, part, data, val)
-    metrics = fit(task, config, out_dir, "generator", progress, processes)
-    if processes.first:
-        info = _info(data, config, joint_limits, "generator", metrics)
-        save_checkpoint(out_dir, info, generator=module, half=True)
+    _fit_and_write(task, module, data, config, out_dir, joint_limits, progress, processes)
     return module
 
 
@@ -110,10 +107,7 @@ def distill_generator(
     lower, upper = (torch.tensor(limit, dtype=torch.float32) for limit in joint_limits)
     judge = copy.deepcopy(evaluator)
     task = FlowDistillationTask(module, teacher, judge, (lower, upper), part, data, val)
-    metrics = fit(task, config, out_dir, "generator", progress, processes)
-    if processes.first:
-        info = _info(data, config, joint_limits, "generator", metrics)
-        save_checkpoint(out_dir, info, generator=module, half=True)
+    _fit_and_write(task, module, data, config, out_dir, joint_limits, progress, processes)
     return module
 
 
@@ -148,10 +142,7 @@ def distill_evaluator(
     part = dataclasses.replace(config, views=processes.share(config.views))
     lower, upper = (torch.tensor(limit, dtype=torch.float32) for limit in joint_limits)
     task = EvaluatorDistillationTask(module, teacher, generator, (lower, upper), part, data, val)
-    metrics = fit(task, config, out_dir, "evaluator", progress, processes)
-    if processes.first:
-        info = _info(data, config, joint_limits, "evaluator", metrics)
-        save_checkpoint(out_dir, info, evaluator=module, half=True)
+    _fit_and_write(task, module, data, config, out_dir, joint_limits, progress, processes)
     return module
 
 
@@ -169,10 +160,8 @@ def train_evaluator(
     _check_data(data, config.model)
     module = initial_network(FFHEvaluator, data, config, palm_points).to(processes.device)
     part = dataclasses.replace(config, views=processes.share(config.views))
-    metrics = fit(EvaluatorTask(module, part, data, val), config, out_dir, "evaluator", progress, processes)
-    if processes.first:
-        info = _info(data, config, joint_limits, "evaluator", metrics)
-        save_checkpoint(out_dir, info, evaluator=module, half=True)
+    task = EvaluatorTask(module, part, data, val)
+    _fit_and_write(task, module, data, config, out_dir, joint_limits, progress, processes)
     return module
 
 
@@ -208,6 +197,28 @@ def _check_data(data: TrainingData, model: ModelConfig) -> None:
             f"the model takes {model.num_joints} joints and {model.bps_size} BPS values, "
             f"the data has {came[0]} and {came[1]}"
         )
+
+
+def _fit_and_write(
+    task: Task,
+    module: Generator | FFHEvaluator,
+    data: TrainingData,
+    config: TrainingConfig,
+    out_dir: Path,
+    joint_limits: tuple[Sequence[float], Sequence[float]],
+    progress: bool,
+    processes: Processes,
+) -> None:
+    """Train `module` by `task`; process 0 writes it beside what `out_dir` already holds."""
+    name = "evaluator" if isinstance(module, FFHEvaluator) else "generator"
+    metrics = fit(task, config, out_dir, name, progress, processes)
+    if not processes.first:
+        return
+    info = _info(data, config, joint_limits, name, metrics)
+    if isinstance(module, FFHEvaluator):
+        save_checkpoint(out_dir, info, evaluator=module, half=True)
+    else:
+        save_checkpoint(out_dir, info, generator=module, half=True)
 
 
 def _info(
