@@ -57,6 +57,8 @@ class GenerateOptions:
     """Weights whose generator proposes grasps too."""
     learned: int = 0
     """Executed trials per placement of that generator."""
+    rounds: int = 1
+    """How often all of these are asked, at most; again only at placements where fewer than 20 trials held."""
     repeated_share: float = 0.05
     """Share of the trials with contact that are repeated under varied pose, mass and friction."""
     repeats: int = 5
@@ -74,6 +76,8 @@ def run(options: GenerateOptions) -> None:
     require_sim("generate")
     if not 0 <= options.repeated_share <= 1 or not 1 <= options.repeats <= 100:
         raise OptionError("--repeated-share must lie between 0 and 1, --repeats between 1 and 100")
+    if options.rounds < 1:
+        raise OptionError(f"--rounds must be at least 1, got {options.rounds}")
     executor = _executor(options)
     sources = _sources(options)
     hand = _checked_hand(options)
@@ -92,6 +96,7 @@ def run(options: GenerateOptions) -> None:
         power=options.power,
         perturb=options.perturb,
         learned=options.learned,
+        rounds=options.rounds,
         weights=weights,
         repeated_share=options.repeated_share,
         repeats=options.repeats,

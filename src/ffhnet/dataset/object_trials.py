@@ -42,6 +42,8 @@ class GenerateConfig:
         perturb: trials per round and placement.
         max_collisions: start collisions kept as negatives per proposer and placement.
         learned: executed trials per placement of a trained generator; with `weights`.
+        rounds: how often all proposers are asked, at most; again only where too few grasps held.
+        enough: successes of a placement after which they are not asked again.
         repeated_share: share of the trials that touched the object which are repeated under variation.
         repeats: how often.
         weights: folder of weights, or None for no learned proposals.
@@ -57,6 +59,8 @@ class GenerateConfig:
     perturb: int = 40
     max_collisions: int = 20
     learned: int = 0
+    rounds: int = 1
+    enough: int = 20
     weights: str | None = None
     repeated_share: float = 0.05
     repeats: int = 5
@@ -110,9 +114,24 @@ class _Placement:
         if config.weights is not None:
             network = _load_network(config.weights)
             proposers.append(("learned", config.learned, partial(self._generate, network)))
+        blocks: list[TrialBlock] = []
+        for _ in range(config.rounds):
+            blocks += self._try_round(proposers, blocks)
+            if sum(np.count_nonzero(block.results.success) for block in blocks) >= config.enough:
+                break
+        return [block for block in blocks if len(block.grasps)]
+
+    def _try_round(
+        self, proposers: list[tuple[str, int, Callable[[View, int], Grasps]]], before: list[TrialBlock]
+    ) -> list[TrialBlock]:
+        """What each proposer proposes, then rounds of perturb-and-keep around the successes so far."""
+        config = self._config
         blocks = [self._try(name, wanted, propose) for name, wanted, propose in proposers if wanted > 0]
         for _ in range(config.perturb_rounds if config.perturb > 0 else 0):
-            good = [(b.grasps[b.results.success], b.results.closed_joints[b.results.success]) for b in blocks]
+            good = [
+                (block.grasps[block.results.success], block.results.closed_joints[block.results.success])
+                for block in before + blocks
+            ]
             parents = Grasps.concatenate([grasps for grasps, _ in good])
             if len(parents) == 0:
                 break
@@ -120,7 +139,7 @@ class _Placement:
             closed = np.concatenate([joints for _, joints in good])[chosen]
             children = perturb(parents[chosen], closed, self._hand, self._rng)
             blocks.append(self._block("perturb", children))
-        return [block for block in blocks if len(block.grasps)]
+        return blocks
 
     def _block(self, proposer: str, grasps: Grasps) -> TrialBlock:
         grasps = as_stored(grasps)

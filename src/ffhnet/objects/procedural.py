@@ -10,15 +10,16 @@ import numpy as np
 import trimesh
 
 from ffhnet.errors import ObjectError
-from ffhnet.objects import packages, tableware, tools, toys, vessels
+from ffhnet.objects import packages, tableware, tools, toys, trinkets, vessels
 from ffhnet.objects.grasp_object import GraspObject
 from ffhnet.objects.inertia import default_mass, piece_properties
 from ffhnet.objects.resting import resting_poses
 
 Split = Literal["train", "val", "test"]
 
-Collection = Literal["procedural", "varied"]
-"""Packages and vessels that stand, as in a cupboard; and everything else: tableware, tools and toys."""
+Collection = Literal["procedural", "varied", "awkward"]
+"""Packages and vessels that stand, as in a cupboard; everything else: tableware, tools and toys; and of the
+latter, with small and flat things, those that are hard to grasp."""
 
 SPLIT_SIZE = 1_000_000
 """Seeds per split, so that the splits never meet."""
@@ -93,7 +94,29 @@ VARIED: dict[str, Family] = {
 """Wide, flat, long, lying and branching things, of which the other collection has few. The hand cannot grasp
 some of them (`graspability.why_not_graspable`), as in any set of real objects."""
 
-FAMILIES = PROCEDURAL | VARIED
+AWKWARD: dict[str, Family] = {
+    "marble": Family(trinkets.marble, 5),
+    "toy_block": Family(trinkets.toy_block, 8),
+    "brick": Family(trinkets.brick, 6),
+    "pyramid": Family(trinkets.pyramid, 4),
+    "cutlery": Family(trinkets.cutlery, 8),
+    **{
+        name: Family(VARIED[name].draw, weight)
+        for name, weight in {
+            "plate": 7, "wide_bowl": 4, "pan": 10, "pitcher": 5, "teapot": 6, "hammer": 9, "screwdriver": 5,
+            "wrench": 6, "pliers": 6, "ladle": 5, "power_tool": 6, "aircraft": 10, "ring": 7,
+        }.items()
+    },
+}  # fmt: skip
+"""Small, flat and thin things, on which most samples of generators trained on the other two fail."""
+
+_FAMILIES: dict[Collection, dict[str, Family]] = {
+    "procedural": PROCEDURAL,
+    "varied": VARIED,
+    "awkward": AWKWARD,
+}
+
+FAMILIES = PROCEDURAL | VARIED | AWKWARD
 """All families by name."""
 
 
@@ -159,7 +182,8 @@ def _generator(seed: int) -> np.random.Generator:
 
 
 def _draw_family(seed: int, rng: np.random.Generator) -> str:
-    families = PROCEDURAL if seed < FIRST_SEED["varied-train"] else VARIED
+    collections = list(_FAMILIES.values())
+    families = collections[min(seed // (3 * SPLIT_SIZE), len(collections) - 1)]
     weights = np.array([family.weight for family in families.values()])
     return str(rng.choice(list(families), p=weights / weights.sum()))
 
