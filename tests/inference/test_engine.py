@@ -3,6 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
 from torch import nn
@@ -10,6 +11,7 @@ from torch import nn
 from ffhnet.errors import OptionError
 from ffhnet.geometry.basis import basis_points
 from ffhnet.geometry.rotations import rotation_from_6d
+from ffhnet.hands.link_points import LinkPoints
 from ffhnet.inference import engine as engine_module
 from ffhnet.inference.distance_grid import GridMaker, PalmReader
 from ffhnet.inference.engine import Engine
@@ -18,6 +20,7 @@ from ffhnet.model import CheckpointInfo, FFHEvaluator, FFHGenerator, GraspTensor
 from ffhnet.model.checkpoint import Checkpoint, load_checkpoint
 from ffhnet.model.flow import FlowGenerator
 from ffhnet.model.local_geometry import LocalGeometry
+from ffhnet.model.placed_links import PlacedLinks
 from ffhnet.model.resblock import ConditionedLinear
 
 torch.set_num_threads(1)
@@ -32,6 +35,8 @@ CONFIGS = {
     "other points": replace(DEFAULT, palm_points=13, flow_palm_points=3, flow_steps=3, temperature=0.5),
     "blind flow": replace(DEFAULT, palm_points=0, use_table_height=False, use_joints=False),
     "flow without points": replace(DEFAULT, flow_palm_points=0, judge_robustness=False),
+    "links": replace(DEFAULT, links=6, link_points=9),
+    "links summed up": DEFAULT.with_links(6, 9),
     "no table": replace(DEFAULT, use_table_height=False, flow_steps=1),
     "paper": PAPER,
     "public code": replace(PAPER, use_joints=False),
@@ -64,6 +69,8 @@ def scramble(network: nn.Module, seed: int) -> None:
                 module.bias.normal_(0, 0.3, generator=g)
             if isinstance(module, LocalGeometry):
                 module.points.uniform_(-0.08, 0.08, generator=g)
+            if isinstance(module, PlacedLinks):
+                module.take(random_links(module, g))
         config = network.config
         if config.pca_components is not None:
             network.condition.bps_mean.uniform_(0, 0.2, generator=g)
@@ -75,6 +82,31 @@ def scramble(network: nn.Module, seed: int) -> None:
         # As of trained networks, the two columns of a rotation are seldom so short that rounding turns it.
         if isinstance(network, FFHGenerator):
             network.rotation_head.bias[[0, 4]] += 3
+
+
+def random_links(module: PlacedLinks, g: torch.Generator) -> LinkPoints:
+    """A hand of two fingers on a palm, with points, axes, couplings and opening of chance."""
+
+    def random(*shape: int, size: float = 1.0) -> np.ndarray:
+        return size * torch.randn(*shape, generator=g).numpy()
+
+    links, points = len(module.parent), len(module.points)
+    joints = len(module.opened)
+    fixed = np.tile(np.eye(4), (links, 1, 1))
+    fixed[:, :3, :3] = rotation_from_6d(torch.randn(links, 6, generator=g)).numpy()
+    fixed[:, :3, 3] = random(links, 3, size=0.04)
+    axis = random(links, 3)
+    return LinkPoints(
+        parent=np.maximum(np.arange(links) - 2, 0),
+        fixed=fixed,
+        axis=axis / np.linalg.norm(axis, axis=1, keepdims=True),
+        leader=np.arange(links) % joints,
+        powers=random(links, 5, size=0.5),
+        opened=random(joints),
+        closes=np.arange(joints) % 2 == 0,
+        points=random(points, 3, size=0.02),
+        link=np.arange(points) % links,
+    )
 
 
 def make_checkpoint(config: ModelConfig) -> Checkpoint:

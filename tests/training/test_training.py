@@ -15,7 +15,7 @@ from ffhnet.errors import DatasetError, OptionError, WeightsError
 from ffhnet.model import load_checkpoint
 from ffhnet.model.config import ModelConfig
 from ffhnet.model.losses import JOINTS_WEIGHT, KL_WEIGHT
-from ffhnet.training import TrainingConfig, train_evaluator, train_generator
+from ffhnet.training import LookPoints, TrainingConfig, train_evaluator, train_generator
 from ffhnet.training import loop as loop_module
 from ffhnet.training.batches import BatchMaker
 from ffhnet.training.tasks import EvaluatorTask, FlowTask, GeneratorTask
@@ -103,7 +103,7 @@ def test_killed_run_resumes_to_the_same_weights(
 ):
     data = make_world(0)
     short = replace(short, model=replace(short.model, generator=kind, palm_points=4))
-    train = partial(train, palm_points=np.linspace(-0.05, 0.05, 12).reshape(4, 3))
+    train = partial(train, look=LookPoints(np.linspace(-0.05, 0.05, 12).reshape(4, 3)))
     whole = train(data, data, short, tmp_path / "whole", joint_limits, progress=False)
 
     plain_loss = task_kind.loss

@@ -15,8 +15,13 @@ from ffhnet.apps.hand_option import HandOption, for_workers
 from ffhnet.errors import OptionError
 
 if TYPE_CHECKING:
+    from ffhnet.hands import Hand
+    from ffhnet.hands.link_points import LinkPoints
     from ffhnet.training.config import Network, TrainingConfig
     from ffhnet.training.processes import Processes
+
+POINTS_PER_LINK = 4
+"""Points on each link of the hand at which the default preset's evaluator looks."""
 
 
 @dataclass(frozen=True)
@@ -65,18 +70,21 @@ def run(options: TrainOptions) -> None:
         _train(options, processes)
 
 
-def _config(options: TrainOptions, network: Network, num_joints: int) -> TrainingConfig:
+def _config(options: TrainOptions, network: Network, hand: Hand, links: LinkPoints) -> TrainingConfig:
     """The preset's run of a network, with what the options change."""
     import dataclasses
 
     from ffhnet.training.config import TrainingConfig
 
+    num_joints = hand.num_joints
     if options.preset == "paper":
         config = TrainingConfig.paper(num_joints)
     elif options.preset == "small":
         config = TrainingConfig.small(network, num_joints)
     else:
         config = TrainingConfig.default(network, num_joints)
+        model = config.model.with_links(len(links.parent), len(links.points))
+        config = dataclasses.replace(config, model=model)
     model = dataclasses.replace(config.model, generator=options.generator or config.model.generator)
     return dataclasses.replace(config, model=model, steps=options.steps or config.steps, seed=options.seed)
 
@@ -86,9 +94,10 @@ def _train(options: TrainOptions, processes: Processes) -> None:
 
     from ffhnet.dataset.records import read_training_data
     from ffhnet.hands import load_hand
+    from ffhnet.hands.link_points import link_points
     from ffhnet.hands.surface_points import surface_points
     from ffhnet.model.checkpoint import read_info
-    from ffhnet.training import train_evaluator, train_generator
+    from ffhnet.training import LookPoints, train_evaluator, train_generator
 
     if options.threads < 1 or (options.steps is not None and options.steps < 1):
         raise OptionError("--threads and --steps must be at least 1")
@@ -97,16 +106,17 @@ def _train(options: TrainOptions, processes: Processes) -> None:
     val = None if options.val is None else read_training_data([options.val])
     hand = load_hand(for_workers(options.hand or data.hand, data.hand))
     limits = (hand.lower.tolist(), hand.upper.tolist())
-    generator = _config(options, "generator", hand.num_joints)
-    evaluator = _config(options, "evaluator", hand.num_joints)
+    links = link_points(hand, POINTS_PER_LINK)
+    generator = _config(options, "generator", hand, links)
+    evaluator = _config(options, "evaluator", hand, links)
     count = evaluator.model.palm_points
-    points = surface_points(hand, count) if count else None
+    look = LookPoints(surface_points(hand, count), links) if count else None
     if processes.first:
         print(f"{len(data.object_names)} objects, {data.num_views} views, {data.num_trials} trials")
     if options.networks != "evaluator":
-        train_generator(data, val, generator, options.out, limits, points, processes=processes)
+        train_generator(data, val, generator, options.out, limits, look, processes=processes)
     if options.networks != "generator":
-        train_evaluator(data, val, evaluator, options.out, limits, points, processes=processes)
+        train_evaluator(data, val, evaluator, options.out, limits, look, processes=processes)
     if processes.first and val is not None:
         summary = read_info(options.out).training
         rows = [

@@ -132,9 +132,15 @@ class EvaluatorEngine:
         self._own_width = config.grasp_width(config.use_joints)
         grasp = norm_affine(network.grasp_norm, self._own_width, like)
         scale, offset = [grasp.scale], [grasp.offset]
+        self._local = network.local
         if self._reader is not None:
-            scale.append(self._reader.affine.scale)
-            offset.append(self._reader.affine.offset)
+            affine = self._reader.affine
+            if network.local is not None:
+                self._local_weight = (network.local.weight * affine.scale).T.contiguous()
+                self._local_bias = network.local.bias + network.local.weight @ affine.offset
+                affine = norm_affine(nn.Identity(), config.local_width, like)
+            scale.append(affine.scale)
+            offset.append(affine.offset)
         kept = norm_affine(nn.Identity(), config.width, like)
         own = Affine(torch.cat(scale), torch.cat(offset))
         joined = Affine(torch.cat([kept.scale, own.scale]), torch.cat([kept.offset, own.offset]))
@@ -160,8 +166,12 @@ class EvaluatorEngine:
         x, own = joined[:, :width], joined[:, width:]
         own[:, : self._own_width] = grasps.features(c, with_joints=c.use_joints)[0]
         if self._reader is not None and view.grid is not None:
-            rotation, position = grasps.rotation[0], grasps.position[0]
-            self._reader.write(view.grid, rotation, position, own[:, self._own_width :])
+            rotation, position, joints = grasps.rotation[0], grasps.position[0], grasps.joints[0]
+            around = own[:, self._own_width :]
+            raw = around if self._local is None else around.new_empty(num, self._reader.width)
+            self._reader.write(view.grid, rotation, position, raw, joints)
+            if self._local is not None:
+                around.copy_(functional.silu(torch.addmm(self._local_bias, raw, self._local_weight)))
         wide = joined.new_empty(num, len(view.blocks[0]))
         for b, (block, seen) in enumerate(zip(self._blocks, view.blocks, strict=True)):
             block.write(seen, own if b == 0 else joined, wide, x)

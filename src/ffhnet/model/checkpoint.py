@@ -139,9 +139,12 @@ def weights_digest(folder: Path) -> dict[str, str]:
 
 
 def _storable(network: nn.Module, half: bool) -> dict[str, torch.Tensor]:
-    """Weights on the CPU; vectors stay 32-bit, since a running variance can be too small for 16 bits."""
+    """Weights on the CPU; vectors stay 32-bit, since a running variance can be too small for 16 bits.
+
+    So do stacks of matrices, which place the hand's links.
+    """
     return {
-        name: (tensor.half() if half and tensor.ndim >= 2 else tensor).detach().cpu().contiguous()
+        name: (tensor.half() if half and tensor.ndim == 2 else tensor).detach().cpu().contiguous()
         for name, tensor in network.state_dict().items()
     }
 

@@ -35,6 +35,11 @@ class ModelConfig:
         width: output width of a ResBlock.
         dropout: dropout after each ResBlock of the evaluator.
         palm_points: points around the hand at which evaluator and flow read the distance field, 0 for none.
+        links: links of the hand.
+        link_points: points on them, which move with the joints, at which the evaluator reads the field and
+            the height over the table, for the open hand and for the grasp's joints; 0 for none.
+        local_width: width of the layer that sums up for the evaluator what is read around the hand, or 0 to
+            feed that to each block as it is.
         judge_robustness: the evaluator also predicts success under varied physics, and start collisions.
         flow_width: width of the flow's blocks.
         flow_blocks: number of them.
@@ -59,6 +64,9 @@ class ModelConfig:
     width: int = 512
     dropout: float = 0.3
     palm_points: int = 96
+    links: int = 0
+    link_points: int = 0
+    local_width: int = 0
     judge_robustness: bool = True
     flow_width: int = 384
     flow_blocks: int = 4
@@ -72,9 +80,12 @@ class ModelConfig:
             raise OptionError(f"all sizes of ModelConfig must be at least 1, got {sizes}")
         if self.flow_steps > MAX_FLOW_STEPS:
             raise OptionError(f"flow_steps must be at most {MAX_FLOW_STEPS}, got {self.flow_steps}")
-        if min(self.palm_points, self.flow_palm_points) < 0:
-            counts = (self.palm_points, self.flow_palm_points)
-            raise OptionError(f"palm_points and flow_palm_points must be at least 0, got {counts}")
+        counts = (self.palm_points, self.flow_palm_points, self.links, self.link_points, self.local_width)
+        if min(counts) < 0:
+            names = "palm_points, flow_palm_points, links, link_points, local_width"
+            raise OptionError(f"{names} must be at least 0, got {counts}")
+        if self.link_points and not (self.links > 0 and self.palm_points and self.use_table_height):
+            raise OptionError("link_points want links, palm_points and use_table_height")
         if not 0 < self.temperature <= 2:
             raise OptionError(f"the temperature must lie above 0 and up to 2, got {self.temperature}")
         if self.generator not in ("cvae", "flow"):
@@ -124,6 +135,10 @@ class ModelConfig:
             judge_robustness=False,
         )
 
+    def with_links(self, links: int, points: int) -> ModelConfig:
+        """The same with an evaluator that looks at some points on a hand's links, too."""
+        return dataclasses.replace(self, links=links, link_points=points, local_width=128)
+
     def student(self) -> ModelConfig:
         """The same with networks of a thirtieth of the multiplications, to be distilled from this one's.
 
@@ -138,6 +153,9 @@ class ModelConfig:
             inner_width=64,
             width=128,
             palm_points=min(self.palm_points, 48),
+            links=0,
+            link_points=0,
+            local_width=0,
             dropout=0.0,
         )
 

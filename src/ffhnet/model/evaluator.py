@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
+from torch.nn import functional
 
 from ffhnet.model.condition import ObjectCondition
 from ffhnet.model.config import ModelConfig
@@ -38,10 +39,14 @@ class FFHEvaluator(nn.Module):
         self.config = config
         grasp, condition, width = config.grasp_width(config.use_joints), config.condition_width, config.width
         self.condition = ObjectCondition(config)
-        self.geometry = local_geometry(config, config.palm_points)
+        self.geometry = local_geometry(config, config.palm_points, with_links=True)
         self.grasp_norm = GroupedBatchNorm(grasp) if config.input_batch_norm else nn.Identity()
         self.condition_norm = GroupedBatchNorm(condition) if config.input_batch_norm else nn.Identity()
-        own = grasp if self.geometry is None else grasp + self.geometry.width
+        own, self.local = grasp, None
+        if self.geometry is not None:
+            own += config.local_width or self.geometry.width
+            if config.local_width:
+                self.local = nn.Linear(self.geometry.width, config.local_width)
         self.blocks = nn.ModuleList(
             ResBlock(width_in, condition, config.inner_width, width, config.skip_batch_norm)
             for width_in in (own, width + own, width + own)
@@ -60,7 +65,10 @@ class FFHEvaluator(nn.Module):
         condition = self.condition_norm(self.condition(objects))
         x0 = self.grasp_norm(grasps.features(self.config, with_joints=self.config.use_joints))
         if self.geometry is not None:
-            x0 = torch.cat([x0, self.geometry(self.geometry.field(objects.bps), objects, grasps)], dim=-1)
+            around = self.geometry(self.geometry.field(objects.bps), objects, grasps)
+            if self.local is not None:
+                around = functional.silu(self.local(around))
+            x0 = torch.cat([x0, around], dim=-1)
         first, *others = self.blocks
         x = self.dropout(first(x0, condition))
         for block in others:

@@ -13,6 +13,7 @@ from torch.nn import functional
 
 from ffhnet.geometry.basis import BASIS_RADIUS, basis_points
 from ffhnet.model.config import ModelConfig
+from ffhnet.model.placed_links import POSTURES, PlacedLinks
 from ffhnet.model.tensors import GraspTensors, ObjectTensors
 
 GRID = 24
@@ -31,7 +32,14 @@ FAR_LIMIT = 3.0
 """These features end at this many times `FAR`."""
 
 HEIGHT_EVERY = 6
-"""The height over the table is read at every sixth point."""
+"""The height over the table is read at every sixth point fixed to the palm, and at all points of links."""
+
+LINK_NEAR = 0.01
+LINK_HEIGHT = 0.02
+"""m: the scales `NEAR` and `FAR` of points on links, for distances and heights: they touch what they grip."""
+
+LINK_BELOW, LINK_ABOVE = -1.0, 3.0
+"""Heights of points on links end at these times `LINK_HEIGHT`."""
 
 
 class DistanceField(nn.Module):
@@ -74,21 +82,26 @@ class LocalGeometry(nn.Module):
         count: points in the palm frame; zero until `set_points` is called. They travel with the weights.
         bps_size: length of the basis point set vector.
         with_heights: whether the height of the table may be used.
+        links: points on the hand's links, which move with the joints; these need the height of the table.
     """
 
     points: Tensor
 
-    def __init__(self, count: int, bps_size: int, with_heights: bool = True):
+    def __init__(
+        self, count: int, bps_size: int, with_heights: bool = True, links: PlacedLinks | None = None
+    ):
         super().__init__()
         self.with_heights = with_heights
         self.field = DistanceField(bps_size)
+        self.links = links
         self.register_buffer("points", torch.zeros(count, 3))
 
     @property
     def width(self) -> int:
         """Number of features of a grasp."""
         count = len(self.points)
-        return 2 * count + (len(range(0, count, HEIGHT_EVERY)) if self.with_heights else 0)
+        of_links = 0 if self.links is None else 3 * POSTURES * self.links.count
+        return 2 * count + (len(range(0, count, HEIGHT_EVERY)) if self.with_heights else 0) + of_links
 
     def set_points(self, points: Float[np.ndarray, "K 3"]) -> None:
         """Store the points (m, palm frame) at which the field is read."""
@@ -109,6 +122,16 @@ class LocalGeometry(nn.Module):
         if self.with_heights:
             height = points[:, :, ::HEIGHT_EVERY, 2] - objects.table_height[:, None, None]
             features.append((height / FAR).clamp(-FAR_LIMIT, FAR_LIMIT))
+        if self.links is not None:
+            placed = self.links(grasps.joints.flatten(0, 1)).unflatten(0, grasps.joints.shape[:2])
+            points = placed @ grasps.rotation.transpose(-1, -2) + grasps.position.unsqueeze(2)
+            distance = DistanceField.read(grid, points)
+            height = (points[..., 2] - objects.table_height[:, None, None]) / LINK_HEIGHT
+            features += [
+                torch.exp(-distance / LINK_NEAR),
+                (distance / FAR).clamp(max=FAR_LIMIT) - 1,
+                height.clamp(LINK_BELOW, LINK_ABOVE),
+            ]
         return torch.cat(features, dim=-1)
 
 
@@ -132,7 +155,16 @@ def _plane_fit(bps_size: int) -> tuple[Int[np.ndarray, "M k"], Float[np.ndarray,
     return index, np.where(inside, weight, closeness)
 
 
-def local_geometry(config: ModelConfig, count: int) -> LocalGeometry | None:
-    """The module with the first `count` of a model's palm points, or None if that leaves none."""
+def local_geometry(config: ModelConfig, count: int, with_links: bool = False) -> LocalGeometry | None:
+    """The module with the first `count` of a model's palm points, or None if that leaves none.
+
+    Args:
+        config: the architecture.
+        count: points fixed to the palm.
+        with_links: look at the points of the model's links, too, if it has any.
+    """
     count = min(count, config.palm_points)
-    return LocalGeometry(count, config.bps_size, config.use_table_height) if count else None
+    links = None
+    if with_links and config.link_points:
+        links = PlacedLinks(config.links, config.link_points, config.num_joints)
+    return LocalGeometry(count, config.bps_size, config.use_table_height, links) if count else None

@@ -13,7 +13,7 @@ from ffhnet.model.losses import JOINTS_WEIGHT, KL_WEIGHT
 Network = Literal["generator", "evaluator"]
 """What is trained."""
 
-STEPS: dict[Network, int] = {"generator": 4000, "evaluator": 2800}
+STEPS: dict[Network, int] = {"generator": 4000, "evaluator": 2200}
 """Of the project's own preset."""
 
 DISTILLATION_STEPS: dict[Network, int] = {"generator": 1200, "evaluator": 1000}

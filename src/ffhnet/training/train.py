@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,6 +15,7 @@ from jaxtyping import Float
 
 from ffhnet.dataset.training_data import TrainingData
 from ffhnet.errors import DatasetError, OptionError
+from ffhnet.hands.link_points import LinkPoints
 from ffhnet.model.checkpoint import CheckpointInfo, Generator, save_checkpoint
 from ffhnet.model.config import ModelConfig
 from ffhnet.model.evaluator import FFHEvaluator
@@ -30,6 +32,20 @@ from ffhnet.training.tasks import EvaluatorTask, FlowTask, GeneratorTask, Task
 
 Network = TypeVar("Network", FFHGenerator, FlowGenerator, FFHEvaluator)
 
+
+@dataclass(frozen=True)
+class LookPoints:
+    """Where around the hand networks look.
+
+    Attributes:
+        palm: points fixed to the palm, m, palm frame.
+        links: points on the hand's links, for models that look there.
+    """
+
+    palm: Float[np.ndarray, "K 3"]
+    links: LinkPoints | None = None
+
+
 STATISTICS_VIEWS, STATISTICS_GRASPS = 256, 32
 """Size of the batch from which a flow takes mean and deviation of its state."""
 
@@ -40,7 +56,7 @@ def train_generator(
     config: TrainingConfig,
     out_dir: Path,
     joint_limits: tuple[Sequence[float], Sequence[float]],
-    palm_points: Float[np.ndarray, "K 3"] | None = None,
+    look: LookPoints | None = None,
     progress: bool = True,
     processes: Processes = ALONE,
 ) -> Generator:
@@ -52,7 +68,7 @@ def train_generator(
         config: architecture and run.
         out_dir: gets the checkpoint, a log and a state file; an interrupted run goes on from the latter.
         joint_limits: lower and upper limits in radians, in the order of `data.joint_names`.
-        palm_points: where around the hand the networks look (m, palm frame), for models that do.
+        look: where around the hand the networks look, for models that do.
         progress: show a progress bar.
         processes: those that train this network together, and where; each calls this with the same
             arguments, draws its part of the batch, and gets the same network. Process 0 writes.
@@ -66,10 +82,10 @@ def train_generator(
     task: Task
     module: Generator
     if config.model.generator == "flow":
-        module = initial_network(FlowGenerator, data, config, palm_points).to(processes.device)
+        module = initial_network(FlowGenerator, data, config, look).to(processes.device)
         task = FlowTask(module, part, data, val)
     else:
-        module = initial_network(FFHGenerator, data, config, palm_points).to(processes.device)
+        module = initial_network(FFHGenerator, data, config, look).to(processes.device)
         task = GeneratorTask(module, part, data, val)
     _fit_and_write(task, module, data, config, out_dir, joint_limits, progress, processes)
     return module
@@ -152,13 +168,13 @@ def train_evaluator(
     config: TrainingConfig,
     out_dir: Path,
     joint_limits: tuple[Sequence[float], Sequence[float]],
-    palm_points: Float[np.ndarray, "K 3"] | None = None,
+    look: LookPoints | None = None,
     progress: bool = True,
     processes: Processes = ALONE,
 ) -> FFHEvaluator:
     """Train an FFHEvaluator on all trials in `data` and write it to `out_dir`; else as `train_generator`."""
     _check_data(data, config.model)
-    module = initial_network(FFHEvaluator, data, config, palm_points).to(processes.device)
+    module = initial_network(FFHEvaluator, data, config, look).to(processes.device)
     part = dataclasses.replace(config, views=processes.share(config.views))
     task = EvaluatorTask(module, part, data, val)
     _fit_and_write(task, module, data, config, out_dir, joint_limits, progress, processes)
@@ -169,7 +185,7 @@ def initial_network(
     kind: type[Network],
     data: TrainingData,
     config: TrainingConfig,
-    palm_points: Float[np.ndarray, "K 3"] | None,
+    look: LookPoints | None,
 ) -> Network:
     """The network to begin with; what is fixed during training is fitted to the data."""
     with seeded(config.seed):
@@ -178,11 +194,15 @@ def initial_network(
         module.condition.set_projection(fit_projection(data.bps, config.model.pca_components))
     geometry = None if isinstance(module, FFHGenerator) else module.geometry
     if geometry is not None:
-        if palm_points is None:
+        if look is None:
             raise OptionError(
                 f"this model looks at {config.model.palm_points} points around the palm, got none"
             )
-        geometry.set_points(palm_points[: len(geometry.points)])
+        geometry.set_points(look.palm[: len(geometry.points)])
+        if geometry.links is not None:
+            if look.links is None:
+                raise OptionError(f"this model looks at {config.model.link_points} points on links, got none")
+            geometry.links.take(look.links)
     if isinstance(module, FlowGenerator):
         batches = BatchMaker.for_generator(data, config.min_local_success, config.min_margin)
         rng = np.random.default_rng(config.seed)
