@@ -35,6 +35,7 @@ from ffhnet.dataset.scoring import score
 from ffhnet.dataset.training_data import TrainingData
 from ffhnet.errors import SceneError
 from ffhnet.hands import load_hand
+from ffhnet.hands.link_points import link_points
 from ffhnet.hands.surface_points import surface_points
 from ffhnet.inference.ffhnet import FFHNet
 from ffhnet.metrics import wilson_interval
@@ -45,7 +46,7 @@ from ffhnet.simulation.scene import build_scene
 from ffhnet.simulation.trial import GraspTrial
 from ffhnet.simulation.views import ViewMaker
 from ffhnet.training.config import ClassShares, TrainingConfig
-from ffhnet.training.train import train_evaluator, train_generator
+from ffhnet.training.train import LookPoints, train_evaluator, train_generator
 
 SEED = 31
 """Of the views and samples on which generators are tried."""
@@ -91,12 +92,16 @@ def half_of_the_objects(data: TrainingData) -> TrainingData:
     return data.select_objects(np.arange(len(data.object_names)) % 2 == 0)
 
 
+NO_LINKS = {"links": 0, "link_points": 0, "local_width": 0}
+"""These need the joint angles, the palm points and the height of the table."""
+
 ROWS = (
     Row("as shipped", "evaluator"),
+    Row("without points on the links", "evaluator", model(**NO_LINKS)),
     Row("raw BPS instead of its projection", "evaluator", model(pca_components=None)),
-    Row("without the joint angles (public code)", "evaluator", model(use_joints=False)),
-    Row("without the height of the table", "evaluator", model(use_table_height=False)),
-    Row("without distances around the palm", "evaluator", model(palm_points=0)),
+    Row("without the joint angles (public code)", "evaluator", model(use_joints=False, **NO_LINKS)),
+    Row("without the height of the table", "evaluator", model(use_table_height=False, **NO_LINKS)),
+    Row("without distances around the palm", "evaluator", model(palm_points=0, **NO_LINKS)),
     Row("success as the only output", "evaluator", model(judge_robustness=False)),
     Row(
         "without start collisions as negatives",
@@ -118,8 +123,8 @@ ROWS = (
     Row("as shipped", "generator"),
     Row("the paper's cVAE", "generator", model(generator="cvae")),
     Row("raw BPS instead of its projection", "generator", model(pca_components=None)),
-    Row("without the height of the table", "generator", model(use_table_height=False)),
-    Row("without distances around the palm", "generator", model(palm_points=0)),
+    Row("without the height of the table", "generator", model(use_table_height=False, **NO_LINKS)),
+    Row("without distances around the palm", "generator", model(palm_points=0, **NO_LINKS)),
     Row("all successes, however lucky", "generator", run(min_local_success=0.0, min_margin=0.0)),
     Row("successes of the heuristic alone", "generator", data=proposed_by("heuristic")),
     Row("without successes of own samples", "generator", data=proposed_by("heuristic", "power", "perturb")),
@@ -184,12 +189,14 @@ def main(options: Options) -> None:
 
 def train(row: Row, data: TrainingData, folder: Path, steps: int) -> None:
     """Both networks into a folder, of which only the row's has learned anything."""
-    config = row.config(dataclasses.replace(TrainingConfig.default(row.network), steps=steps))
     hand = load_hand(data.hand)
+    links = link_points(hand)
+    default = TrainingConfig.default(row.network)
+    config = row.config(dataclasses.replace(default, model=default.model.with_links(links), steps=steps))
     limits = (hand.lower.tolist(), hand.upper.tolist())
-    points = surface_points(hand, config.model.palm_points) if config.model.palm_points else None
+    look = LookPoints(surface_points(hand, config.model.palm_points), links)
     learn = train_evaluator if row.network == "evaluator" else train_generator
-    learn(row.data(data), None, config, folder, limits, points)
+    learn(row.data(data), None, config, folder, limits, look)
     if row.network == "generator":
         info = read_info(folder)
         save_checkpoint(folder, info, evaluator=FFHEvaluator(info.model))

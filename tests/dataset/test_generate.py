@@ -1,5 +1,6 @@
 """The generation job on two small objects: what is written, and that labels and frames are right."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from executor_work import HereExecutor
 
 from ffhnet.dataset.generate import generate
-from ffhnet.dataset.object_trials import GenerateConfig
+from ffhnet.dataset.object_trials import GenerateConfig, try_object
 from ffhnet.dataset.records import pack, read_header, read_tables, read_training_data
 from ffhnet.dataset.statistics import summarise
 from ffhnet.errors import DatasetError
@@ -46,6 +47,23 @@ def test_what_is_written(data_set):
     assert (rise[outcome == "success"] >= 0.15).all()
     assert (rise[outcome == "collision"] == 0).all()
     assert read_header(data_set)["hand"] == "dlr_hit_ii"
+
+
+def test_proposers_are_asked_again_only_where_too_few_grasps_held():
+    obj = SOURCES[0].load()
+    few, enough, none = (
+        try_object(obj, dataclasses.replace(SMALL, rounds=3, enough=enough))[0] for enough in (10**6, 1, 0)
+    )
+
+    def asked(blocks):
+        return sum(block.proposer == "power" for block in blocks)
+
+    assert (asked(few), asked(none)) == (3, 1)
+    held = np.cumsum([block.results.success.sum() for block in few])
+    assert held[-1] > 0
+    assert asked(enough) <= asked(few)
+    # The first round is the same whether others follow or not.
+    np.testing.assert_array_equal(few[0].grasps.position, none[0].grasps.position)
 
 
 def test_finished_objects_are_left_alone(data_set):

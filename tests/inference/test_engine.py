@@ -36,7 +36,7 @@ CONFIGS = {
     "blind flow": replace(DEFAULT, palm_points=0, use_table_height=False, use_joints=False),
     "flow without points": replace(DEFAULT, flow_palm_points=0, judge_robustness=False),
     "links": replace(DEFAULT, links=6, link_points=9),
-    "links summed up": DEFAULT.with_links(6, 9),
+    "links summed up": replace(DEFAULT, links=6, link_points=9, local_width=12),
     "no table": replace(DEFAULT, use_table_height=False, flow_steps=1),
     "paper": PAPER,
     "public code": replace(PAPER, use_joints=False),

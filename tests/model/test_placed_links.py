@@ -16,7 +16,7 @@ def hand():
 
 @pytest.fixture(scope="module")
 def links(hand):
-    return link_points(hand, 4)
+    return link_points(hand)
 
 
 @pytest.fixture(scope="module")

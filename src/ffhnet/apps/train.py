@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from ffhnet.training.config import Network, TrainingConfig
     from ffhnet.training.processes import Processes
 
-POINTS_PER_LINK = 4
-"""Points on each link of the hand at which the default preset's evaluator looks."""
-
 
 @dataclass(frozen=True)
 class TrainOptions:
@@ -83,8 +80,7 @@ def _config(options: TrainOptions, network: Network, hand: Hand, links: LinkPoin
         config = TrainingConfig.small(network, num_joints)
     else:
         config = TrainingConfig.default(network, num_joints)
-        model = config.model.with_links(len(links.parent), len(links.points))
-        config = dataclasses.replace(config, model=model)
+        config = dataclasses.replace(config, model=config.model.with_links(links))
     model = dataclasses.replace(config.model, generator=options.generator or config.model.generator)
     return dataclasses.replace(config, model=model, steps=options.steps or config.steps, seed=options.seed)
 
@@ -106,7 +102,7 @@ def _train(options: TrainOptions, processes: Processes) -> None:
     val = None if options.val is None else read_training_data([options.val])
     hand = load_hand(for_workers(options.hand or data.hand, data.hand))
     limits = (hand.lower.tolist(), hand.upper.tolist())
-    links = link_points(hand, POINTS_PER_LINK)
+    links = link_points(hand)
     generator = _config(options, "generator", hand, links)
     evaluator = _config(options, "evaluator", hand, links)
     count = evaluator.model.palm_points

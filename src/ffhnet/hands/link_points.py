@@ -14,6 +14,9 @@ from ffhnet.hands.hand import Hand
 CANDIDATES = 600
 """Points of a link from which the spread ones are picked."""
 
+POINTS_PER_LINK = 4
+"""About one per centimetre of a finger."""
+
 DEGREE = 4
 """Highest power in a coupling between joints, as in MuJoCo's `polycoef`."""
 
@@ -45,7 +48,7 @@ class LinkPoints:
     link: Int[np.ndarray, " K"]
 
 
-def link_points(hand: Hand, per_link: int) -> LinkPoints:
+def link_points(hand: Hand, per_link: int = POINTS_PER_LINK) -> LinkPoints:
     """Points on the surface of every link that moves, as far from each other as can be.
 
     Args:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from ffhnet.errors import OptionError
+
+if TYPE_CHECKING:
+    from ffhnet.hands.link_points import LinkPoints
 
 MAX_FLOW_STEPS = 1000
 """More would not make samples better, only keep a robot waiting."""
@@ -135,8 +138,9 @@ class ModelConfig:
             judge_robustness=False,
         )
 
-    def with_links(self, links: int, points: int) -> ModelConfig:
-        """The same with an evaluator that looks at some points on a hand's links, too."""
+    def with_links(self, hand: LinkPoints) -> ModelConfig:
+        """The same with an evaluator that looks at points on a hand's links, too."""
+        links, points = len(hand.parent), len(hand.points)
         return dataclasses.replace(self, links=links, link_points=points, local_width=128)
 
     def student(self) -> ModelConfig:
