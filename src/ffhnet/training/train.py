@@ -32,6 +32,9 @@ from ffhnet.training.tasks import EvaluatorTask, FlowTask, GeneratorTask, Task
 
 Network = TypeVar("Network", FFHGenerator, FlowGenerator, FFHEvaluator)
 
+STATISTICS_VIEWS, STATISTICS_GRASPS = 256, 32
+"""Size of the batch from which a flow takes mean and deviation of its state."""
+
 
 @dataclass(frozen=True)
 class LookPoints:
@@ -44,10 +47,6 @@ class LookPoints:
 
     palm: Float[np.ndarray, "K 3"]
     links: LinkPoints | None = None
-
-
-STATISTICS_VIEWS, STATISTICS_GRASPS = 256, 32
-"""Size of the batch from which a flow takes mean and deviation of its state."""
 
 
 def train_generator(
