@@ -61,7 +61,7 @@ class ModelConfig:
     joint_scale: float = 0.5
     height_scale: float = 0.1
     generator: Literal["cvae", "flow"] = "flow"
-    temperature: float = 0.7
+    temperature: float = 0.75
     latent: int = 5
     inner_width: int = 256
     width: int = 512
