@@ -5,7 +5,7 @@ import pytest
 from feasibility_scenes import box, grasps_from, observe, to_camera, tube
 
 from ffhnet.feasibility.hand_check import HandCheck
-from ffhnet.feasibility.planner import ENOUGH, MAX_BATCHES, Planner
+from ffhnet.feasibility.planner import ENOUGH, TEMPERATURES, Planner
 from ffhnet.feasibility.reasons import Reason
 from ffhnet.geometry.rotations import matrix_from_rotation_vector
 from ffhnet.grasps import Grasps
@@ -77,10 +77,11 @@ class Network:
     """Samples of which few can be done."""
 
     def __init__(self, share):
-        self.seeds, self._share = [], share
+        self.seeds, self.temperatures, self._share = [], [], share
 
-    def grasp(self, observation, num, seed, threshold):
+    def grasp(self, observation, num, seed, threshold, temperature):
         self.seeds.append(seed)
+        self.temperatures.append(temperature)
         good = np.arange(num) < self._share * num
         parts = [grasps_from(SIDE) if ok else grasps_from(SIDE, height=-0.3) for ok in good]
         rng = np.random.default_rng(seed)
@@ -88,13 +89,14 @@ class Network:
         return to_camera(batch).ranked()
 
 
-@pytest.mark.parametrize(("share", "batches"), [(0.5, 1), (0.2, 3), (0.0, MAX_BATCHES)])
+@pytest.mark.parametrize(("share", "batches"), [(0.5, 1), (0.2, 3), (0.0, len(TEMPERATURES))])
 def test_more_are_sampled_where_too_few_are_left(share, batches):
     network = Network(share)
     plan = Planner(network, load_hand()).plan(observe(tube()), num=20)
     assert len(set(network.seeds)) == len(network.seeds) == batches
+    assert tuple(network.temperatures) == TEMPERATURES[:batches]
     assert len(plan.grasps) == round(20 * share) * batches
-    assert len(plan.grasps) >= ENOUGH or batches == MAX_BATCHES
+    assert len(plan.grasps) >= ENOUGH or batches == len(TEMPERATURES)
     assert plan.counts == ({"table": len(plan.dropped)} if len(plan.dropped) else {})
     assert len(plan.grasps) + len(plan.dropped) == 20 * batches
     assert (np.diff(plan.grasps.score) <= 0).all()

@@ -119,6 +119,14 @@ def test_an_observation_is_looked_at_once_and_then_forgotten(
     assert reference() is None
 
 
+def test_a_higher_temperature_spreads_the_samples(net: FFHNet, view: View):
+    usual, own, wide = (
+        net.grasp(view, num=200, temperature=t) for t in (None, net.info.model.temperature, 1.4)
+    )
+    np.testing.assert_array_equal(usual.position, own.position)
+    assert wide.position.std(axis=0).sum() > 1.1 * usual.position.std(axis=0).sum()
+
+
 def test_threshold_keeps_the_best(net: FFHNet, view: View):
     every = net.grasp(view, num=100)
     middle = float(every.probability[40])
@@ -145,6 +153,9 @@ def test_refusals(net: FFHNet, view: View):
         net.grasp(view, num=0)
     with pytest.raises(OptionError, match="between 0 and 1"):
         net.grasp(view, threshold=1.5)
+    for temperature in (0.0, -1.0, 2.5, float("nan")):
+        with pytest.raises(OptionError, match="wanted a temperature"):
+            net.grasp(view, temperature=temperature)
 
 
 def test_from_pretrained(tmp_path: Path, checkpoint: Checkpoint, net: FFHNet, view: View):

@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 ENOUGH = 10
 """Feasible grasps after which no more are sampled, and with an arm no more ways are planned."""
 
-MAX_BATCHES = 4
-"""Batches of samples after which a scene is given up."""
+TEMPERATURES = (None, 1.0, 1.0, 1.2)
+"""Of the batches of samples after which a scene is given up: first the weights' own, then more varied ones,
+as the grasps that the generator is sure of all hit something."""
 
 _BLOCK = 16
 """Grasps for which the arm's ways are planned together."""
@@ -55,15 +56,15 @@ class Planner:
 
         Args:
             observation: what the camera sees.
-            num: grasps to sample at a time, up to `MAX_BATCHES` times until `ENOUGH` are feasible.
+            num: grasps to sample at a time, up to four times until `ENOUGH` are feasible.
             seed: of the samples; the same seed gives the same grasps.
             threshold: grasps below this success probability are left out.
         """
         scene = self._check.look(observation)
         ways = None if self._arm is None else _Ways(self._arm, observation)
         batches, reasons = [], []
-        for batch in range(MAX_BATCHES):
-            grasps = self._network.grasp(observation, num, seed + batch * _NEXT_SEED, threshold)
+        for batch, temperature in enumerate(TEMPERATURES):
+            grasps = self._network.grasp(observation, num, seed + batch * _NEXT_SEED, threshold, temperature)
             reason = self._check(grasps, scene)
             if ways is not None:
                 reason = ways.extend(grasps, reason)

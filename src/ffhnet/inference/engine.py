@@ -86,10 +86,13 @@ class SeenObject:
     device: torch.device
 
     @torch.inference_mode()
-    def sample(self, num: int, source: torch.Generator) -> GraspTensors:
-        """What the generator's own `sample` gives for the same `source` (on the CPU), up to rounding."""
+    def sample(self, num: int, source: torch.Generator, temperature: float | None = None) -> GraspTensors:
+        """What the generator's own `sample` gives for the same `source` (on the CPU), up to rounding.
+
+        With another temperature than the weights' own, samples vary more or less.
+        """
         noise = torch.randn(1, num, self.noise_width, generator=source)[0]
-        noise = self.temperature * noise.to(self.device)
+        noise = (self.temperature if temperature is None else temperature) * noise.to(self.device)
         return GraspTensors.joined([self.generate(rows) for rows in noise.split(CHUNK)])
 
     @torch.inference_mode()

@@ -21,6 +21,7 @@ from ffhnet.inference.novelty import novelty
 from ffhnet.inference.risk import RiskControl
 from ffhnet.inference.weights_calibration import WeightsCalibration, load_calibration
 from ffhnet.model.checkpoint import Checkpoint, CheckpointInfo, load_checkpoint
+from ffhnet.model.config import MAX_TEMPERATURE
 from ffhnet.model.tensors import GraspTensors, ObjectTensors
 
 if TYPE_CHECKING:
@@ -81,7 +82,12 @@ class FFHNet:
         return cls(load_checkpoint(folder, hand=hand), device, load_calibration(folder))
 
     def grasp(
-        self, observation: Observation, num: int = 400, seed: int = 0, threshold: float = 0.0
+        self,
+        observation: Observation,
+        num: int = 400,
+        seed: int = 0,
+        threshold: float = 0.0,
+        temperature: float | None = None,
     ) -> Grasps:
         """Sample grasps, rate them, and rank them.
 
@@ -90,6 +96,8 @@ class FFHNet:
             num: grasps to sample.
             seed: of the latent samples; the same seed gives the same grasps.
             threshold: grasps below this success probability are left out, possibly all.
+            temperature: standard deviation of the samples' noise. Above the weights' own, which None takes,
+                they vary more, and fewer of them hold.
 
         Returns:
             Grasps in the observation's input frame, best first: by `robustness` where the evaluator predicts
@@ -97,8 +105,10 @@ class FFHNet:
         """
         if not 0 <= threshold <= 1:
             raise OptionError(f"the threshold is a probability between 0 and 1, got {threshold}")
-        seen = self._look(observation)
-        rated = self._rate(seen, self._sample(seen, num, torch.Generator().manual_seed(seed)))
+        if temperature is not None and not 0 < temperature <= MAX_TEMPERATURE:
+            raise OptionError(f"wanted a temperature above 0, up to {MAX_TEMPERATURE:g}, got {temperature}")
+        seen, source = self._look(observation), torch.Generator().manual_seed(seed)
+        rated = self._rate(seen, self._sample(seen, num, source, temperature))
         assert rated.probability is not None
         ranked = rated[rated.probability >= threshold].ranked()
         return ranked.to_frame(observation.T_input_view, observation.frame)
@@ -157,10 +167,12 @@ class FFHNet:
         distance = novelty(self.evaluator.condition, observation.bps)
         return None if limit is None or distance is None else distance / limit.limit
 
-    def _sample(self, seen: SeenObject, num: int, source: torch.Generator) -> Grasps:
+    def _sample(
+        self, seen: SeenObject, num: int, source: torch.Generator, temperature: float | None = None
+    ) -> Grasps:
         if num < 1:
             raise OptionError(f"the number of grasps must be at least 1, got {num}")
-        raw = seen.sample(num, source)
+        raw = seen.sample(num, source, temperature)
         return Grasps(
             rotation=raw.rotation[0].double().cpu().numpy(),
             position=raw.position[0].double().cpu().numpy(),

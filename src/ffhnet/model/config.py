@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 MAX_FLOW_STEPS = 1000
 """More would not make samples better, only keep a robot waiting."""
 
+MAX_TEMPERATURE = 2.0
+"""Above it, samples are noise."""
+
 
 @dataclass(frozen=True)
 class ModelConfig:
@@ -89,8 +92,10 @@ class ModelConfig:
             raise OptionError(f"{names} must be at least 0, got {counts}")
         if self.link_points and not (self.links > 0 and self.palm_points and self.use_table_height):
             raise OptionError("link_points want links, palm_points and use_table_height")
-        if not 0 < self.temperature <= 2:
-            raise OptionError(f"the temperature must lie above 0 and up to 2, got {self.temperature}")
+        if not 0 < self.temperature <= MAX_TEMPERATURE:
+            raise OptionError(
+                f"the temperature must lie above 0 and up to {MAX_TEMPERATURE:g}, got {self.temperature}"
+            )
         if self.generator not in ("cvae", "flow"):
             raise OptionError(f"the generator is 'cvae' or 'flow', got {self.generator!r}")
         if self.pca_components is not None and not 1 <= self.pca_components <= self.bps_size:
