@@ -49,6 +49,7 @@ ROTATIONS, TRANSFORMS = "geometry/rotations.py", "geometry/transforms.py"
 GRASPS, VIEW, TABLE = "grasps.py", "perception/view_frame.py", "perception/table.py"
 OBSERVATION, TRIAL = "perception/observation.py", "simulation/trial.py"
 LOCAL, RECORDS = "dataset/robustness.py", "dataset/records.py"
+LINKS = "model/placed_links.py"
 
 MUTANTS = {
     "tests/geometry": (
@@ -81,9 +82,15 @@ MUTANTS = {
         Mutant(OBSERVATION, "T @ T_optical_view, table_height", "T_optical_view, table_height"),
         Mutant(TABLE, "points @ self.normal - self.offset", "points @ self.normal + self.offset"),
     ),
+    "tests/model/test_placed_links.py": (
+        Mutant(LINKS, "eye + sine * cross", "eye - sine * cross"),
+        Mutant(LINKS, "torch.cat([opened, joints])", "torch.cat([joints, opened])"),
+        Mutant(LINKS, "poses[:, self.parent[generation]] @ local", "poses[:, generation] @ local"),
+        Mutant(LINKS, "angle * of_leader + self", "angle + self"),
+        Mutant(LINKS, ".squeeze(-1) + poses[..., :3, 3]", ".squeeze(-1)"),
+    ),
     "tests/simulation/test_trial.py": (
         Mutant(TRIAL, "-back[:, None] * grasps", "back[:, None] * grasps"),
-        Mutant(TRIAL, "height - row.rise > 0.10", "height - row.rise > 10.0"),
         Mutant(TRIAL, "if row.rise < physics.min_rise:", "if row.rise > physics.min_rise:"),
         Mutant(TRIAL, "if links == 0:", "if links != 0:"),
         Mutant(TRIAL, "return links > 0 and not on_table", "return links > 0"),

@@ -9,7 +9,7 @@ from executor_work import HereExecutor
 
 from ffhnet.dataset.generate import generate
 from ffhnet.dataset.object_trials import GenerateConfig, try_object
-from ffhnet.dataset.records import pack, read_header, read_tables, read_training_data
+from ffhnet.dataset.records import pack, read_header, read_tables, read_training_data, trials_table
 from ffhnet.dataset.statistics import summarise
 from ffhnet.errors import DatasetError
 from ffhnet.objects.catalogue import resolve_objects
@@ -47,6 +47,17 @@ def test_what_is_written(data_set):
     assert (rise[outcome == "success"] >= 0.15).all()
     assert (rise[outcome == "collision"] == 0).all()
     assert read_header(data_set)["hand"] == "dlr_hit_ii"
+
+
+def test_repeats_are_stored_with_how_many_held():
+    obj = SOURCES[0].load()
+    blocks, _ = try_object(obj, dataclasses.replace(SMALL, repeated_share=1.0, repeats=3))
+    table = trials_table(obj.name, blocks)
+    repeats, held = table["repeats"].to_numpy(), table["held"].to_numpy()
+    np.testing.assert_array_equal(repeats, np.concatenate([block.repeats for block in blocks]))
+    np.testing.assert_array_equal(held, np.concatenate([block.held for block in blocks]))
+    assert set(repeats) == {0, 3}
+    assert 0 < held.sum() < repeats.sum()
 
 
 def test_proposers_are_asked_again_only_where_too_few_grasps_held():

@@ -121,6 +121,18 @@ def test_slippery_object_is_not_lifted(hand):
     assert not results.success[0]
 
 
+def test_an_object_in_the_closed_hand_that_still_stands_is_not_in_hand(hand):
+    """The hand has closed and touches it, and so does the table."""
+    trial, grasp = GraspTrial(build_scene(hand, cylinder(mass=20.0))), side_grasp(hand, 0.12)
+    trial._reset(np.eye(4))
+    trial._scene.place_hand(hand.root_pose(grasp.rotation[0], grasp.position[0]), hand.open(grasp.joints[0]))
+    trial._close(grasp.joints[0])
+    links, on_table = trial._touching()
+    assert links > 0
+    assert on_table
+    assert not trial._in_hand()
+
+
 def heuristic_grasps(hand, trial, count):
     mesh = cylinder().visual
     points, faces = trimesh.sample.sample_surface(mesh, 2000, seed=0)

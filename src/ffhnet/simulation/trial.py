@@ -19,6 +19,9 @@ from ffhnet.simulation.scene import HAND, OBJECT, TABLE, Scene
 SWEEP_PERIODS = 2
 """Control periods between the finger poses at which first contact is looked for: 3 mm at the tips."""
 
+LEFT_BEHIND = 0.10
+"""m by which an object may lag behind the hand: further off it was left on the table or is falling."""
+
 REST_PERIODS = 8
 REST_SHARE = 0.25
 """An object off the table is held when it moves in the hand at less than this share of the allowed slip for
@@ -209,8 +212,7 @@ class GraspTrial:
             self._scene.raise_hand(height)
             self._advance()
             row.rise = self._object_height() - start[2]
-            # An object that lags by 10 cm has been left on the table or is falling.
-            if height - row.rise > 0.10 or (height - row.rise > 0.01 and self._touching()[0] == 0):
+            if height - row.rise > LEFT_BEHIND or (height - row.rise > 0.01 and self._touching()[0] == 0):
                 return row
             if period % REST_PERIODS == 0:
                 if self._rests(row, anchor, still_to_rise=physics.lift_height - height):
