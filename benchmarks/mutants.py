@@ -83,7 +83,7 @@ MUTANTS = {
         Mutant(TABLE, "points @ self.normal - self.offset", "points @ self.normal + self.offset"),
     ),
     "tests/model/test_placed_links.py": (
-        Mutant(LINKS, "eye + sine * cross", "eye - sine * cross"),
+        Mutant(LINKS, "nothing, -z, y, z", "nothing, z, y, -z"),
         Mutant(LINKS, "torch.cat([opened, joints])", "torch.cat([joints, opened])"),
         Mutant(LINKS, "poses[:, self.parent[generation]] @ local", "poses[:, generation] @ local"),
         Mutant(LINKS, "angle * of_leader + self", "angle + self"),

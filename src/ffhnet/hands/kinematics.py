@@ -104,7 +104,7 @@ class KinematicTree:
         fixed, cross = (
             torch.as_tensor(part, dtype=joints.dtype, device=joints.device) for part in self._constants
         )
-        local = fixed @ _hinges(cross, torch.stack(angles, dim=1))
+        local = fixed @ hinges(cross, torch.stack(angles, dim=1))
         poses: list[Tensor] = []
         for i, body in enumerate(self.bodies):
             poses.append(local[:, i] if body.parent < 0 else poses[body.parent] @ local[:, i])
@@ -118,7 +118,7 @@ class KinematicTree:
         return np.stack([body.T_parent_body for body in self.bodies]), cross
 
 
-def _hinges(cross: Float[Tensor, "L 3 3"], angle: Float[Tensor, "B L"]) -> Float[Tensor, "B L 4 4"]:
+def hinges(cross: Float[Tensor, "L 3 3"], angle: Float[Tensor, "B L"]) -> Float[Tensor, "B L 4 4"]:
     """Rotations about unit axes, given as cross products (Rodrigues), as transforms."""
     s, c = torch.sin(angle)[..., None, None], torch.cos(angle)[..., None, None]
     transform = torch.zeros(*angle.shape, 4, 4, dtype=angle.dtype, device=angle.device)

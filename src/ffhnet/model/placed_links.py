@@ -6,6 +6,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from ffhnet.hands.kinematics import hinges
 from ffhnet.hands.link_points import DEGREE, LinkPoints
 
 POSTURES = 2
@@ -67,7 +68,7 @@ class PlacedLinks(nn.Module):
         angle = torch.zeros_like(of_leader)
         for power in reversed(range(DEGREE + 1)):
             angle = angle * of_leader + self.powers[:, power, 0]
-        local = self.fixed @ _hinges(self.axis.squeeze(-1), angle)
+        local = self.fixed @ hinges(_cross_products(self.axis.squeeze(-1)), angle)
         # Links of one generation at once: what costs time is the number of calls.
         poses = local
         for generation in self._generations():
@@ -84,14 +85,8 @@ class PlacedLinks(nn.Module):
         return [torch.nonzero(rows == k).flatten() for k in range(1, max(age) + 1)]
 
 
-def _hinges(axis: Float[Tensor, "L 3"], angle: Float[Tensor, "M L"]) -> Float[Tensor, "M L 4 4"]:
-    """Rotations about unit axes (Rodrigues) as transforms; about an axis of zero, none."""
+def _cross_products(axis: Float[Tensor, "L 3"]) -> Float[Tensor, "L 3 3"]:
+    """The matrices of the cross products with some vectors."""
     x, y, z = axis.unbind(dim=-1)
     nothing = torch.zeros_like(x)
-    cross = torch.stack([nothing, -z, y, z, nothing, -x, -y, x, nothing], dim=-1).unflatten(-1, (3, 3))
-    sine, cosine = torch.sin(angle)[..., None, None], torch.cos(angle)[..., None, None]
-    transform = torch.zeros(*angle.shape, 4, 4, dtype=angle.dtype, device=angle.device)
-    eye = torch.eye(3, dtype=angle.dtype, device=angle.device)
-    transform[..., :3, :3] = eye + sine * cross + (1 - cosine) * (cross @ cross)
-    transform[..., 3, 3] = 1
-    return transform
+    return torch.stack([nothing, -z, y, z, nothing, -x, -y, x, nothing], dim=-1).unflatten(-1, (3, 3))
