@@ -148,6 +148,35 @@ def test_weights_that_do_not_fit_the_description(folder: Path):
         load_checkpoint(folder)
 
 
+@pytest.mark.parametrize(
+    "name", ["width", "flow_width", "palm_points", "links", "link_points", "local_width"]
+)
+def test_sizes_far_beyond_the_files_are_refused_before_memory_is_taken(folder: Path, name: str):
+    content = json.loads((folder / "config.json").read_text())
+    content["model"].update({"generator": "flow", "links": 3, "link_points": 2, name: 10_000_000})
+    (folder / "config.json").write_text(json.dumps(content))
+    with pytest.raises(WeightsError, match="weights, there are at most"):
+        load_checkpoint(folder)
+
+
+@pytest.mark.parametrize(
+    ("buffer", "values"),
+    [("parent", [0, 2, 0]), ("parent", [0, 0, -1]), ("leader", [0, 2, 0]), ("link", [3, 0])],
+)
+def test_a_hand_whose_links_do_not_exist_is_refused(tmp_path: Path, networks, buffer: str, values: list[int]):
+    model = dataclasses.replace(MODEL, palm_points=6, links=3, link_points=2)
+    evaluator = FFHEvaluator(model)
+    assert evaluator.geometry is not None
+    links = evaluator.geometry.links
+    assert links is not None
+    save_checkpoint(tmp_path, dataclasses.replace(INFO, model=model), FFHGenerator(model), evaluator)
+    load_checkpoint(tmp_path)
+    getattr(links, buffer).copy_(torch.tensor(values))
+    save_checkpoint(tmp_path, dataclasses.replace(INFO, model=model), evaluator=evaluator)
+    with pytest.raises(WeightsError, match=r"evaluator\.safetensors describes no hand"):
+        load_checkpoint(tmp_path)
+
+
 def test_limits_must_fit_the_joints():
     with pytest.raises(OptionError, match="1 lower"):
         dataclasses.replace(INFO, joint_lower=(0.0,))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import random
 import resource
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -31,22 +31,25 @@ def fill_disk(writer: Writer, folder: Path, share: float) -> str:
     """
     before = contents(folder)
     size = max(len(before[name]) for name in writer.files)
-    child = os.fork()
-    if child == 0:
-        # Nothing of the parent may run in the child: it ends here, whatever happens.
-        with contextlib.suppress(BaseException):
-            resource.setrlimit(resource.RLIMIT_FSIZE, (int(share * size), resource.RLIM_INFINITY))
-            try:
-                writer.write(folder)
-            except FFHNetError:
-                os._exit(10)
-            except Exception:
-                os._exit(11)
-        os._exit(12)
-    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    if status != 10:
-        return {11: "another error", 12: "nothing was said"}.get(status, f"ended with {status}")
-    return "refused" if contents(folder) == before else "files were changed"
+    try:
+        with _file_size_limit(int(share * size)):
+            writer.write(folder)
+    except FFHNetError:
+        return "refused" if contents(folder) == before else "files were changed"
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
+    return "nothing was said"
+
+
+@contextlib.contextmanager
+def _file_size_limit(limit: int) -> Iterator[None]:
+    """No file of this process can grow beyond so many bytes; Python ignores the signal, writing raises."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def flip_bit(writer: Writer, folder: Path, name: str, chance: random.Random) -> str:

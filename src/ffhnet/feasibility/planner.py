@@ -56,7 +56,7 @@ class Planner:
 
         Args:
             observation: what the camera sees.
-            num: grasps to sample at a time, up to four times until `ENOUGH` are feasible.
+            num: grasps to sample at a time, once per entry of `TEMPERATURES` until `ENOUGH` are feasible.
             seed: of the samples; the same seed gives the same grasps.
             threshold: grasps below this success probability are left out.
         """

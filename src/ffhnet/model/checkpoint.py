@@ -20,6 +20,7 @@ from ffhnet.model.config import ModelConfig
 from ffhnet.model.evaluator import FFHEvaluator
 from ffhnet.model.flow import FlowGenerator
 from ffhnet.model.generator import FFHGenerator
+from ffhnet.model.placed_links import POSTURES, PlacedLinks
 
 Generator = FFHGenerator | FlowGenerator
 """What proposes grasps."""
@@ -168,9 +169,17 @@ def _read_config(folder: Path) -> tuple[CheckpointInfo, dict[str, str]]:
 
 def _networks(config: ModelConfig, folder: Path) -> tuple[Generator, FFHEvaluator]:
     """Both networks, not trained. Raises WeightsError where the folder cannot hold weights of their size."""
+    looked_at = 2 * config.palm_points + 3 * POSTURES * config.link_points
     described = (
-        config.flow_blocks * config.flow_width**2 if config.generator == "flow" else 0,
+        config.flow_width * max(config.flow_blocks * config.flow_width, 2 * config.palm_points)
+        if config.generator == "flow"
+        else 0,
         config.inner_width * config.width,
+        config.inner_width * (config.local_width or looked_at),
+        config.local_width * looked_at,
+        3 * config.palm_points,
+        16 * config.links,
+        3 * config.link_points,
         config.bps_size * (config.pca_components or config.inner_width),
     )
     # A number takes two bytes or more. Larger networks would only fill the memory.
@@ -202,3 +211,5 @@ def _load_weights(path: Path, digest: str | None, network: nn.Module) -> None:
     except (safetensors.SafetensorError, RuntimeError) as error:
         first_line = str(error).splitlines()[0]
         raise WeightsError(f"{path} does not fit the architecture in {CONFIG_FILE}: {first_line}") from error
+    if not all(part.is_sound() for part in network.modules() if isinstance(part, PlacedLinks)):
+        raise WeightsError(f"{path} describes no hand: its links are not in the order of their parents")

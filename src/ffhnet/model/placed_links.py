@@ -55,6 +55,15 @@ class PlacedLinks(nn.Module):
         for name, buffer in self.named_buffers():
             buffer.copy_(torch.as_tensor(getattr(hand, name)).reshape(buffer.shape))
 
+    def is_sound(self) -> bool:
+        """Whether every link comes after its parent, and every joint and link that is named exists."""
+        earlier = torch.arange(len(self.parent), device=self.parent.device).sub(1).clamp(min=0)
+        highest = (earlier, len(self.opened) - 1, len(self.parent) - 1)
+        indices = (self.parent, self.leader, self.link)
+        return all(
+            bool(((index >= 0) & (index <= high)).all()) for index, high in zip(indices, highest, strict=True)
+        )
+
     def forward(self, joints: Float[Tensor, "N J"]) -> Float[Tensor, "N P 3"]:
         """The P = 2K points (m): those of the open hand, then those with these joint angles (rad)."""
         opened = torch.where(self.closes, self.opened, joints)
