@@ -57,11 +57,14 @@ class PlacedLinks(nn.Module):
 
     def is_sound(self) -> bool:
         """Whether every link comes after its parent, and every joint and link that is named exists."""
-        earlier = torch.arange(len(self.parent), device=self.parent.device).sub(1).clamp(min=0)
-        highest = (earlier, len(self.opened) - 1, len(self.parent) - 1)
-        indices = (self.parent, self.leader, self.link)
-        return all(
-            bool(((index >= 0) & (index <= high)).all()) for index, high in zip(indices, highest, strict=True)
+        links, joints = len(self.parent), len(self.opened)
+        earlier = torch.arange(-1, links - 1, device=self.parent.device).clamp(min=0)
+        lowest = min(int(self.parent.min()), int(self.leader.min()), int(self.link.min()))
+        return (
+            lowest >= 0
+            and bool((self.parent <= earlier).all())
+            and int(self.leader.max()) < joints
+            and int(self.link.max()) < links
         )
 
     def forward(self, joints: Float[Tensor, "N J"]) -> Float[Tensor, "N P 3"]:
