@@ -48,6 +48,8 @@ class Options:
     """One after the other."""
     minutes: float = 60.0
     """Of streaming; 0 for none."""
+    rate: float = 30.0
+    """Depth images per second of the stream, fewer where the answers take longer."""
     threads: int = 4
     """That share one network."""
     shared: int = 1000
@@ -101,7 +103,12 @@ def main(options: Options) -> None:
     rows = [[name, *(f"{figures[column]:g}" for column in columns)] for name, figures in report.items()]
     print_table(f"{options.num} samples per request, {options.threads} threads", ("", *columns), rows)
     if options.json is not None:
-        settings = {"num": options.num, "threads": options.threads, "minutes": options.minutes}
+        settings = {
+            "num": options.num,
+            "threads": options.threads,
+            "minutes": options.minutes,
+            "rate": options.rate,
+        }
         options.json.write_text(json.dumps({**settings, **report}, indent=1) + "\n")
     sys.exit(int(any(figures["different"] > 0 for figures in report.values())))
 
@@ -138,8 +145,11 @@ def stream(network: FFHNet, options: Options) -> Served:
     tracker, rng = GraspTracker(network, options.num), np.random.default_rng(0)
     clean = depth_view(*VIEWS[0], noise=0.0)[0]
     seconds, memory, different = [], [], 0
-    end = time.monotonic() + 60 * options.minutes
+    due = time.monotonic()
+    end = due + 60 * options.minutes
     while time.monotonic() < end:
+        time.sleep(max(due - time.monotonic(), 0.0))
+        due = max(due + 1 / options.rate, time.monotonic())
         depth = StereoNoise().apply(clean, REALSENSE_D415, rng)
         start = time.perf_counter()
         grasps = tracker.update(observe_depth(depth, REALSENSE_D415, rng), seed=len(seconds))
