@@ -15,7 +15,6 @@ from ffhnet.apps.hand_option import HandOption, for_workers
 from ffhnet.errors import OptionError
 
 if TYPE_CHECKING:
-    from ffhnet.hands import Hand
     from ffhnet.hands.link_points import LinkPoints
     from ffhnet.training.config import Network, TrainingConfig
     from ffhnet.training.processes import Processes
@@ -67,13 +66,13 @@ def run(options: TrainOptions) -> None:
         _train(options, processes)
 
 
-def _config(options: TrainOptions, network: Network, hand: Hand, links: LinkPoints) -> TrainingConfig:
+def _config(options: TrainOptions, network: Network, links: LinkPoints) -> TrainingConfig:
     """The preset's run of a network, with what the options change."""
     import dataclasses
 
     from ffhnet.training.config import TrainingConfig
 
-    num_joints = hand.num_joints
+    num_joints = len(links.opened)
     if options.preset == "paper":
         config = TrainingConfig.paper(num_joints)
     elif options.preset == "small":
@@ -103,8 +102,8 @@ def _train(options: TrainOptions, processes: Processes) -> None:
     hand = load_hand(for_workers(options.hand or data.hand, data.hand))
     limits = (hand.lower.tolist(), hand.upper.tolist())
     links = link_points(hand)
-    generator = _config(options, "generator", hand, links)
-    evaluator = _config(options, "evaluator", hand, links)
+    generator = _config(options, "generator", links)
+    evaluator = _config(options, "evaluator", links)
     count = evaluator.model.palm_points
     look = LookPoints(surface_points(hand, count), links) if count else None
     if processes.first:

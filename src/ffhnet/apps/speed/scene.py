@@ -23,8 +23,9 @@ def depth_image() -> Float[np.ndarray, "480 640"]:
     return render_depth([can], look_at(np.array([-0.5, 0.1, 0.5]), np.array([0, 0, HEIGHT / 2])), INTRINSICS)
 
 
+@cache
 def visible_side(count: int) -> Float[np.ndarray, "count 3"]:
-    """Random points (m, z up) on the side of the can that a camera at negative x sees."""
+    """Random points (m, z up) on the side of the can that a camera at negative x sees; drawn but once."""
     rng = np.random.default_rng(count)
     angle, z = rng.uniform(-1.4, 1.4, count), rng.uniform(0, HEIGHT, count)
     return np.column_stack([-RADIUS * np.cos(angle), RADIUS * np.sin(angle), z])
