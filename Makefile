@@ -55,6 +55,10 @@ test: $(VENV)/.dev
 	$(BIN)/lint-imports
 	OMP_NUM_THREADS=1 $(BIN)/pytest -n 2
 
+.PHONY: coverage
+coverage: $(VENV)/.dev
+	OMP_NUM_THREADS=1 $(BIN)/pytest -n 2 --cov --cov-report=term
+
 .PHONY: examples
 examples: $(VENV)/.demo
 	$(BIN)/python examples/make_example_views.py
