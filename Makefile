@@ -10,7 +10,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 # pip says much; of it, what is being looked up, fetched and installed shows the progress, line by line.
-PIP_INSTALL := $(BIN)/python -u -m pip install --disable-pip-version-check -c constraints.txt
+CONSTRAINTS ?= constraints.txt
+PIP_INSTALL := $(BIN)/python -u -m pip install --disable-pip-version-check -c $(CONSTRAINTS)
 PROGRESS := awk '/^ *(Collecting|Downloading)|^Building|^Installing|^Successfully installed/ { print substr($$0, 1, 100); fflush() }'
 
 .PHONY: help
@@ -23,15 +24,15 @@ $(BIN)/python:
 	@$(PYTHON) -m venv $(VENV)
 
 # One stamp for each set of dependencies, so that the demo does not wait for the tools of the tests.
-$(VENV)/.demo: $(BIN)/python pyproject.toml constraints.txt
+$(VENV)/.demo: $(BIN)/python pyproject.toml $(CONSTRAINTS)
 	@$(PIP_INSTALL) -e . | $(PROGRESS)
 	@touch $@
 
-$(VENV)/.view: $(BIN)/python pyproject.toml constraints.txt
+$(VENV)/.view: $(BIN)/python pyproject.toml $(CONSTRAINTS)
 	@$(PIP_INSTALL) -e ".[sim,viewer]" | $(PROGRESS)
 	@touch $@ $(VENV)/.demo
 
-$(VENV)/.dev: $(BIN)/python pyproject.toml constraints.txt
+$(VENV)/.dev: $(BIN)/python pyproject.toml $(CONSTRAINTS)
 	@$(PIP_INSTALL) -e ".[dev]" | $(PROGRESS)
 	@$(PIP_INSTALL) --no-deps dexterity==0.0.15 | $(PROGRESS)
 	@touch $@ $(VENV)/.demo $(VENV)/.view
@@ -58,6 +59,11 @@ test: $(VENV)/.dev
 .PHONY: coverage
 coverage: $(VENV)/.dev
 	OMP_NUM_THREADS=1 $(BIN)/pytest -n 2 --cov --cov-report=term
+
+# Every version that the tests ran with. torch without its local label: a build for another device is as good.
+.PHONY: lock
+lock: $(VENV)/.dev
+	$(BIN)/python -m pip freeze --exclude-editable | sed 's/^\(torch==[^+]*\)+.*/\1/' > .ci/lock.txt
 
 .PHONY: examples
 examples: $(VENV)/.demo
