@@ -123,7 +123,7 @@ def turned_bits(root: Path, flips: int, chance: random.Random) -> Iterator[tuple
         writer.write(folder)
         for name in writer.files:
             outcomes = (flip_bit(writer, folder, name, chance) for _ in range(flips))
-            yield f"turned bit: {writer.name}, {Path(name).name}", Counter(outcomes)
+            yield f"turned bit: {writer.name}, {name}", Counter(outcomes)
 
 
 def train(out: Path, steps: int, before: str) -> subprocess.Popen:
