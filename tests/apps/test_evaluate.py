@@ -41,12 +41,29 @@ def test_evaluation_of_one_object(ffhnet, untrained_weights, tmp_path):
     assert text.count("<img") == 3
 
 
+def test_the_arm_lifts_an_object_that_it_knows_from_a_depth_image_only(ffhnet, tmp_path):
+    path = tmp_path / "arm.json"
+    settings = ("--objects", "spray_flask_2000005", "--placements", 1, "--samples", 30, "--workers", 1)
+    status, out, err = ffhnet("evaluate", "--protocol", "arm", *settings, "--json", path)
+    assert (status, err) == (0, "")
+    assert "hand touches no table before closing" in out
+    content = json.loads(path.read_text())
+    assert content["results"] == {"success": 1}
+    assert content["scenes"][0]["rise"] > 0.15
+
+
 @pytest.mark.parametrize(
     ("option", "value", "message"),
-    [("--executed", 0, "--executed"), ("--friction", 0, "above 0"), ("--full-views", -1, "at least 0")],
+    [
+        ("--executed", 0, "--executed"),
+        ("--friction", 0, "above 0"),
+        ("--full-views", -1, "at least 0"),
+        ("--neighbours", 30, "--neighbours must be from 0 to 2"),
+    ],
 )
 def test_bad_options_are_one_line(ffhnet, option, value, message):
-    status, _, err = ffhnet("evaluate", option, value)
+    arm = ("--protocol", "arm", "--objects", "procedural-test:3") if option == "--neighbours" else ()
+    status, _, err = ffhnet("evaluate", option, value, *arm)
     assert status == 2
     assert message in err
     assert len(err.splitlines()) == 1
