@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 from jaxtyping import Bool, Float, Int
 
 from ffhnet.geometry.transforms import invert
 from ffhnet.hands.hand import Hand
+
+if TYPE_CHECKING:
+    import trimesh
 
 CANDIDATES = 600
 """Points of a link from which the spread ones are picked."""
@@ -84,6 +87,9 @@ def link_points(hand: Hand, per_link: int = POINTS_PER_LINK) -> LinkPoints:
 
 def _spread(shape: trimesh.Trimesh, count: int) -> Float[np.ndarray, "count 3"]:
     """Points of a surface, the first the farthest from the link's joint, each next far from those before."""
+    # Here, since every use of networks imports this module, and trimesh takes half a second.
+    import trimesh
+
     points = trimesh.sample.sample_surface(shape, CANDIDATES, seed=1)[0]
     chosen = [int(np.linalg.norm(points, axis=1).argmax())]
     nearest = np.full(len(points), np.inf)
