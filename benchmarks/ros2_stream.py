@@ -49,6 +49,8 @@ class Options:
     """Keep one in so many of the 640 x 480 pixels."""
     num: int = 400
     """Grasps that the node samples for a view."""
+    weights: str = ""
+    """Weights of the node; empty takes the package's own."""
     json: Annotated[Path | None, absent("FILE")] = None
     """Write the figures to this file."""
 
@@ -58,7 +60,8 @@ def main(options: Options) -> None:
     os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     program = "from ffhnet.apps.cli import main; main()"
-    node = subprocess.Popen([sys.executable, "-c", program, "ros", "--num", str(options.num)])
+    settings = ["--num", str(options.num), "--weights", options.weights]
+    node = subprocess.Popen([sys.executable, "-c", program, "ros", *settings])
     publisher = multiprocessing.get_context("spawn").Process(target=publish, args=(options,))
     try:
         figures = watch(node, publisher, options)
