@@ -44,6 +44,11 @@ def commands(page):
 SHOWN = sorted({command for page in PAGES for command in commands(page)})
 
 
+def is_quick(command):
+    """Whether the command is run as it is shown."""
+    return any(command[: len(start)] == start for start in QUICK)
+
+
 def names(command):
     """A short name for a test."""
     return " ".join(command)[:60]
@@ -101,9 +106,7 @@ def place(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize(
-    "command", [c for c in SHOWN if any(c[: len(start)] == start for start in QUICK)], ids=names
-)
+@pytest.mark.parametrize("command", filter(is_quick, SHOWN), ids=names)
 def test_quick_commands_run(command, place, monkeypatch, capsys):
     monkeypatch.chdir(place)
     cli.main(list(command))

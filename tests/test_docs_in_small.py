@@ -6,30 +6,35 @@ other tests: servers (`view`, `ros`), Ray clusters that are not there, and `benc
 
 import shlex
 import shutil
+from itertools import pairwise
 
 import pytest
 import trimesh
 
 from ffhnet.apps import cli
-from test_docs import ROOT, SHOWN
+from test_docs import ROOT, SHOWN, is_quick
 
 FEW = {
     "generate": {
-        **{"--count": 1, "--placements": 1, "--views": 1, "--workers": 1},
-        **{"--heuristic": 1, "--power": 3, "--perturb": 1, "--rounds": 1},
+        "--count": 1,
+        "--placements": 1,
+        "--views": 1,
+        "--workers": 1,
+        "--heuristic": 1,
+        "--power": 3,
+        "--perturb": 1,
+        "--rounds": 1,
     },
     "train": {"--steps": 2, "--threads": 1},
     "distil": {"--steps": 2, "--threads": 1},
     "calibrate": {
-        **{
-            "--objects": "procedural-val:4",
-            "--first": 0,
-            "--fit": 2,
-            "--samples": 20,
-            "--views": 1,
-            "--executed": 2,
-            "--workers": 1,
-        }
+        "--objects": "procedural-val:4",
+        "--first": 0,
+        "--fit": 2,
+        "--samples": 20,
+        "--views": 1,
+        "--executed": 2,
+        "--workers": 1,
     },
     "evaluate": {"--placements": 1, "--samples": 10, "--executed": 2, "--full-views": 0, "--workers": 1},
     "objects import": {},
@@ -37,7 +42,7 @@ FEW = {
 }
 """What is set, shown or not, by command."""
 
-IF_SHOWN = {"--learned": "2", "--neighbours": "1", "--repeats": "1", "--count": "1"}
+IF_SHOWN = {"--learned": "2", "--neighbours": "1", "--repeats": "1"}
 """What is made small where it is shown."""
 
 NAMES = {
@@ -45,9 +50,13 @@ NAMES = {
     "FOLDER": "my_objects",
     "MESHES": "meshes",
     "DIR": "meshes",
+    "data/train?": "tiny",
     "data/val0": "tiny",
+    "data/shadow": "shadow_data",
+    "my_weights": "shadow_weights",
+    **{f"WEIGHTS_{n}": "WEIGHTS" for n in range(9)},
 }
-NAMES |= {f"WEIGHTS_{n}": "WEIGHTS" for n in range(9)} | {"data/train?": "tiny"}
+"""Files and folders of the pages, and what stands for them in `place`."""
 
 
 def small(command):
@@ -56,17 +65,14 @@ def small(command):
     if name is None or "ray" in command:
         return None
     words = list(command)
-    for i, word in enumerate(words):
-        previous = words[i - 1]
+    for i, (previous, word) in enumerate(pairwise(command), 1):
         if previous == "--objects" and ":" in word:
-            first = int(words[words.index("--first") + 1]) if "--first" in words else 0
-            words[i] = f"{word.split(':')[0]}:{first + 1 + ('--neighbours' in words)}"
-        elif previous == "--out" or (name in ("generate", "export") and i == 1 and word != "WEIGHTS"):
+            first = int(command[command.index("--first") + 1]) if "--first" in command else 0
+            words[i] = f"{word.split(':')[0]}:{first + 1 + ('--neighbours' in command)}"
+        elif previous in ("--out", "generate"):
             words[i] = f"out/{word.replace('/', '_')}"
         elif previous == "--json":
             words[i] = "out/result.json"
-        elif word == "my_weights" or (word == "data/shadow" and name == "train"):
-            words[i] = f"shadow_{word.removeprefix('data/')}"
         else:
             words[i] = IF_SHOWN.get(previous, NAMES.get(word, word))
     if name == "evaluate" and "--objects" not in words:
@@ -74,12 +80,12 @@ def small(command):
     for option, value in FEW[name].items():
         if option in words:
             words[words.index(option) + 1] = str(value)
-        elif option != "--executed" or "arm" not in words:
+        else:
             words += [option, str(value)]
     return tuple(words)
 
 
-SMALL = sorted({command for command in map(small, SHOWN) if command is not None})
+SMALL = sorted(filter(None, {small(command) for command in SHOWN}))
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +94,7 @@ def place(tmp_path_factory):
     folder = tmp_path_factory.mktemp("small")
     shipped = ROOT / "src" / "ffhnet" / "weights"
     shutil.copytree(shipped, folder / "WEIGHTS")
-    shutil.copytree(shipped / "shadow", folder / "shadow_my_weights")
+    shutil.copytree(shipped / "shadow", folder / "shadow_weights")
     (folder / "meshes").mkdir()
     trimesh.creation.box((0.05, 0.06, 0.12)).export(folder / "meshes" / "carton.obj")
     with pytest.MonkeyPatch.context() as patch:
@@ -96,7 +102,7 @@ def place(tmp_path_factory):
         few = [word for option, value in FEW["generate"].items() for word in (option, str(value))]
         cli.main(["objects", "import", "meshes", "--out", "my_objects"])
         cli.main(["generate", "tiny", "--objects", "procedural-val:2", *few, "--count", "2", "--power", "9"])
-        cli.main(["generate", "shadow_shadow", "--hand", "shadow", *few, "--count", "2", "--power", "9"])
+        cli.main(["generate", "shadow_data", "--hand", "shadow", *few, "--count", "2", "--power", "9"])
     return folder
 
 
@@ -110,6 +116,5 @@ def test_long_commands_run_in_small(command, place, monkeypatch, capsys):
 
 
 def test_all_that_is_left_out_is_known():
-    quick = {"grasp", "objects", "hand", "data"}
-    left = {command[0] for command in SHOWN if small(command) is None} - quick
+    left = {command[0] for command in SHOWN if small(command) is None and not is_quick(command)}
     assert left == {"benchmark", "view", "ros", "generate"}

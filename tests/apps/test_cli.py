@@ -17,33 +17,31 @@ MAIN = "from ffhnet.apps.cli import main; main()"
 INTRINSICS = ("--intrinsics", 615, 615, 320, 240)
 
 
+def run_without_loading(libraries, *arguments):
+    """What a command prints in a process of its own, which must not load any of the libraries."""
+    check = (
+        "import sys\nfrom ffhnet.apps.cli import main\n"
+        f"try:\n    main({[str(word) for word in arguments]!r})\n"
+        "except SystemExit as stop:\n    assert not stop.code\n"
+        f"heavy = {libraries!r} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    done = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 def test_help_loads_no_heavy_library():
-    check = (
-        "import sys\nfrom ffhnet.apps.cli import main\n"
-        "try:\n    main(['--help'])\nexcept SystemExit as stop:\n    assert not stop.code\n"
-        "heavy = {'torch', 'numpy', 'scipy', 'trimesh', 'mujoco', 'PIL'} & set(sys.modules)\n"
-        "assert not heavy, heavy"
-    )
-    done = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    text = run_without_loading({"torch", "numpy", "scipy", "trimesh", "mujoco", "PIL"}, "--help")
     for command in cli.COMMANDS:
-        assert command.name in done.stdout
+        assert command.name in text
 
 
-def test_grasps_for_a_cloud_load_no_library_of_meshes_or_physics(tmp_path, untrained_weights):
+def test_grasps_for_a_cloud_load_no_library_of_meshes_or_physics(cloud_npy, untrained_weights, tmp_path):
     """They would add half a second to every cold start."""
-    rng = np.random.default_rng(0)
-    angle, z = rng.uniform(-1.4, 1.4, 500), rng.uniform(0, 0.16, 500)
-    np.save(tmp_path / "can.npy", 0.035 * np.column_stack([-np.cos(angle), np.sin(angle), z / 0.035]))
-    arguments = ["grasp", str(tmp_path / "can.npy"), "--world", "--out", str(tmp_path / "grasps.json")]
-    check = (
-        "import sys\nfrom ffhnet.apps.cli import main\n"
-        f"main({[*arguments, '--weights', str(untrained_weights)]!r})\n"
-        "heavy = {'trimesh', 'networkx', 'mujoco', 'pyarrow', 'numba', 'ray', 'viser'} & set(sys.modules)\n"
-        "assert not heavy, heavy"
-    )
-    done = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    heavy = {"trimesh", "networkx", "mujoco", "pyarrow", "numba", "ray", "viser"}
+    settings = ("--world", "--weights", untrained_weights, "--out", tmp_path / "grasps.json")
+    run_without_loading(heavy, "grasp", cloud_npy, *settings)
 
 
 def test_every_command_has_help(ffhnet):

@@ -52,18 +52,20 @@ def test_the_arm_lifts_an_object_that_it_knows_from_a_depth_image_only(ffhnet, t
     assert content["scenes"][0]["rise"] > 0.15
 
 
+ARM = ("--protocol", "arm", "--objects", "procedural-test:3")
+
+
 @pytest.mark.parametrize(
-    ("option", "value", "message"),
+    ("options", "message"),
     [
-        ("--executed", 0, "--executed"),
-        ("--friction", 0, "above 0"),
-        ("--full-views", -1, "at least 0"),
-        ("--neighbours", 30, "--neighbours must be from 0 to 2"),
+        (("--executed", 0), "--executed"),
+        (("--friction", 0), "above 0"),
+        (("--full-views", -1), "at least 0"),
+        ((*ARM, "--neighbours", 30), "--neighbours must be from 0 to 2"),
     ],
 )
-def test_bad_options_are_one_line(ffhnet, option, value, message):
-    arm = ("--protocol", "arm", "--objects", "procedural-test:3") if option == "--neighbours" else ()
-    status, _, err = ffhnet("evaluate", option, value, *arm)
+def test_bad_options_are_one_line(ffhnet, options, message):
+    status, _, err = ffhnet("evaluate", *options)
     assert status == 2
     assert message in err
     assert len(err.splitlines()) == 1

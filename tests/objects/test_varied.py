@@ -23,10 +23,7 @@ def drawn(collection):
     return [make_object(seed) for seed in range(first, first + COUNT)]
 
 
-COLLECTIONS = ["varied", "awkward"]
-
-
-@pytest.fixture(params=COLLECTIONS)
+@pytest.fixture(params=["varied", "awkward"])
 def objects(request):
     return drawn(request.param)
 

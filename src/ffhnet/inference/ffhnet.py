@@ -21,7 +21,7 @@ from ffhnet.inference.novelty import novelty
 from ffhnet.inference.risk import RiskControl
 from ffhnet.inference.weights_calibration import WeightsCalibration, load_calibration
 from ffhnet.model.checkpoint import Checkpoint, CheckpointInfo, load_checkpoint
-from ffhnet.model.config import MAX_TEMPERATURE
+from ffhnet.model.config import check_temperature
 from ffhnet.model.tensors import GraspTensors, ObjectTensors
 
 if TYPE_CHECKING:
@@ -105,8 +105,8 @@ class FFHNet:
         """
         if not 0 <= threshold <= 1:
             raise OptionError(f"the threshold is a probability between 0 and 1, got {threshold}")
-        if temperature is not None and not 0 < temperature <= MAX_TEMPERATURE:
-            raise OptionError(f"wanted a temperature above 0, up to {MAX_TEMPERATURE:g}, got {temperature}")
+        if temperature is not None:
+            check_temperature(temperature)
         seen, source = self._look(observation), torch.Generator().manual_seed(seed)
         rated = self._rate(seen, self._sample(seen, num, source, temperature))
         assert rated.probability is not None

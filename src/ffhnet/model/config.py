@@ -92,10 +92,7 @@ class ModelConfig:
             raise OptionError(f"{names} must be at least 0, got {counts}")
         if self.link_points and not (self.links > 0 and self.palm_points and self.use_table_height):
             raise OptionError("link_points want links, palm_points and use_table_height")
-        if not 0 < self.temperature <= MAX_TEMPERATURE:
-            raise OptionError(
-                f"the temperature must lie above 0 and up to {MAX_TEMPERATURE:g}, got {self.temperature}"
-            )
+        check_temperature(self.temperature)
         if self.generator not in ("cvae", "flow"):
             raise OptionError(f"the generator is 'cvae' or 'flow', got {self.generator!r}")
         if self.pca_components is not None and not 1 <= self.pca_components <= self.bps_size:
@@ -177,3 +174,9 @@ class ModelConfig:
     def grasp_width(self, with_joints: bool) -> int:
         """Width of what the networks see of a grasp: rotation 9, position 3, joints."""
         return 12 + (self.num_joints if with_joints else 0)
+
+
+def check_temperature(temperature: float) -> None:
+    """Raise OptionError for one at which nothing can be sampled."""
+    if not 0 < temperature <= MAX_TEMPERATURE:
+        raise OptionError(f"wanted a temperature above 0, up to {MAX_TEMPERATURE:g}, got {temperature}")
