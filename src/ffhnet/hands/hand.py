@@ -110,8 +110,7 @@ class Hand:
 
     def body_poses(self, joints: Float[Tensor, "B J"]) -> Float[Tensor, "B L 4 4"]:
         """T_palm_body of every link for batched joint angles (rad)."""
-        T_palm_root = torch.as_tensor(invert(self.T_root_palm), dtype=joints.dtype, device=joints.device)
-        return T_palm_root @ self.tree.body_poses(joints, self.joint_names)
+        return self.tree.body_poses(joints, self.joint_names, invert(self.T_root_palm))
 
     def fingertips(self, joints: Float[Tensor, "B J"]) -> Float[Tensor, "B F 3"]:
         """Positions of the fingertips (the MJCF's sites, in its order) in the palm frame, metres."""

@@ -8,6 +8,7 @@ Anything else that would move a body is refused rather than ignored.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from jaxtyping import Float
-from torch import Tensor
+from torch import Tensor, nn
 
 from ffhnet.errors import HandError
 from ffhnet.geometry.rotations import matrix_from_quaternion
@@ -88,44 +89,71 @@ class KinematicTree:
         return {body.joint.name: body.joint for body in self.bodies if body.joint is not None}
 
     def body_poses(
-        self, joints: Float[Tensor, "B J"], joint_names: tuple[str, ...]
+        self,
+        joints: Float[Tensor, "B J"],
+        joint_names: tuple[str, ...],
+        T_frame_root: Float[np.ndarray, "4 4"] | None = None,
     ) -> Float[Tensor, "B L 4 4"]:
-        """T_root_body of all L bodies for joint angles (rad) of the uncoupled joints `joint_names`."""
+        """Poses of all L bodies for joint angles (rad) of the uncoupled joints `joint_names`.
+
+        In the frame in which `T_frame_root` is the root's pose, or if none in that of the root.
+        """
         angle = {name: joints[:, i] for i, name in enumerate(joint_names)}
         for coupling in self.couplings:
             leader = angle[coupling.leader]
             angle[coupling.follower] = sum(
-                (c * leader**power for power, c in enumerate(coupling.coefficients)),
+                (c * leader**power for power, c in enumerate(coupling.coefficients) if c != 0),
                 start=torch.zeros_like(leader),
             )
         still = torch.zeros_like(joints[:, 0])
         angles = [still if body.joint is None else angle[body.joint.name] for body in self.bodies]
-        # All hinges at once: what costs time is the number of calls.
-        fixed, cross = (
+        fixed, axes = (
             torch.as_tensor(part, dtype=joints.dtype, device=joints.device) for part in self._constants
         )
-        local = fixed @ hinges(cross, torch.stack(angles, dim=1))
-        poses: list[Tensor] = []
-        for i, body in enumerate(self.bodies):
-            poses.append(local[:, i] if body.parent < 0 else poses[body.parent] @ local[:, i])
-        return torch.stack(poses, dim=1)
+        if T_frame_root is not None:
+            root = torch.as_tensor(T_frame_root, dtype=joints.dtype, device=joints.device) @ fixed[:1]
+            fixed = torch.cat([root, fixed[1:]])
+        return link_poses(fixed, axes, [body.parent for body in self.bodies], torch.stack(angles, dim=1))
 
     @cached_property
-    def _constants(self) -> tuple[Float[np.ndarray, "L 4 4"], Float[np.ndarray, "L 3 3"]]:
-        """T_parent_body, and the matrix of the cross product with the joint's axis; zero without a joint."""
+    def _constants(self) -> tuple[Float[np.ndarray, "L 4 4"], Float[np.ndarray, "L 3"]]:
+        """T_parent_body, and the axis of each body's joint; zero without a joint."""
         axes = [np.zeros(3) if body.joint is None else body.joint.axis for body in self.bodies]
-        cross = np.cross(np.array(axes)[:, None], -np.eye(3))
-        return np.stack([body.T_parent_body for body in self.bodies]), cross
+        return np.stack([body.T_parent_body for body in self.bodies]), np.stack(axes)
 
 
-def hinges(cross: Float[Tensor, "L 3 3"], angle: Float[Tensor, "B L"]) -> Float[Tensor, "B L 4 4"]:
-    """Rotations about unit axes, given as cross products (Rodrigues), as transforms."""
-    s, c = torch.sin(angle)[..., None, None], torch.cos(angle)[..., None, None]
-    transform = torch.zeros(*angle.shape, 4, 4, dtype=angle.dtype, device=angle.device)
-    eye = torch.eye(3, dtype=angle.dtype, device=angle.device)
-    transform[..., :3, :3] = eye + s * cross + (1 - c) * (cross @ cross)
-    transform[..., 3, 3] = 1
-    return transform
+def link_poses(
+    fixed: Float[Tensor, "L 4 4"],
+    axis: Float[Tensor, "L 3"],
+    parent: Sequence[int],
+    angle: Float[Tensor, "B L"],
+) -> Float[Tensor, "B L 4 4"]:
+    """Poses of links that turn by some angles (rad), in the frame of the first one's fixed pose.
+
+    Args:
+        fixed: pose of each link in its parent at angle zero.
+        axis: unit axis about which it turns, zero where it does not.
+        parent: of each link, one before it; not read for the first, which has none.
+        angle: of each link.
+    """
+    cross = nn.functional.pad(_cross_products(axis), (0, 1, 0, 1))
+    once, twice = fixed @ cross, fixed @ cross @ cross
+    # Rodrigues' formula, with the batch last: so it is a few products of long rows, and not many of small
+    # matrices, which take ten times as long.
+    angle = angle.T[:, None, None]
+    sine, versine = torch.sin(angle), 1 - torch.cos(angle)
+    local = (fixed[..., None] + sine * once[..., None] + versine * twice[..., None]).unbind()
+    poses = [local[0]]
+    for number, link in zip(parent[1:], local[1:], strict=True):
+        poses.append((poses[number][:, :, None] * link).sum(dim=1))
+    return torch.stack(poses).permute(3, 0, 1, 2)
+
+
+def _cross_products(axis: Float[Tensor, "L 3"]) -> Float[Tensor, "L 3 3"]:
+    """The matrices of the cross products with some vectors."""
+    x, y, z = axis.unbind(dim=-1)
+    nothing = torch.zeros_like(x)
+    return torch.stack([nothing, -z, y, z, nothing, -x, -y, x, nothing], dim=-1).unflatten(-1, (3, 3))
 
 
 def read_mjcf(path: Path, text: str | None = None) -> KinematicTree:

@@ -6,7 +6,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from ffhnet.hands.kinematics import hinges
+from ffhnet.hands.kinematics import link_poses
 from ffhnet.hands.link_points import DEGREE, LinkPoints
 
 POSTURES = 2
@@ -80,25 +80,4 @@ class PlacedLinks(nn.Module):
         angle = torch.zeros_like(of_leader)
         for power in reversed(range(DEGREE + 1)):
             angle = angle * of_leader + self.powers[:, power, 0]
-        local = self.fixed @ hinges(_cross_products(self.axis.squeeze(-1)), angle)
-        # Links of one generation at once: what costs time is the number of calls.
-        poses = local
-        for generation in self._generations():
-            poses = poses.index_copy(1, generation, poses[:, self.parent[generation]] @ local[:, generation])
-        return poses
-
-    def _generations(self) -> list[Tensor]:
-        """Indices of the links that are 1, 2, … joints or bodies away from the root."""
-        parents = self.parent.tolist()
-        age = [0] * len(parents)
-        for link, parent in enumerate(parents):
-            age[link] = age[parent] + 1 if link > 0 else 0
-        rows = torch.tensor(age, device=self.parent.device)
-        return [torch.nonzero(rows == k).flatten() for k in range(1, max(age) + 1)]
-
-
-def _cross_products(axis: Float[Tensor, "L 3"]) -> Float[Tensor, "L 3 3"]:
-    """The matrices of the cross products with some vectors."""
-    x, y, z = axis.unbind(dim=-1)
-    nothing = torch.zeros_like(x)
-    return torch.stack([nothing, -z, y, z, nothing, -x, -y, x, nothing], dim=-1).unflatten(-1, (3, 3))
+        return link_poses(self.fixed, self.axis.squeeze(-1), self.parent.tolist(), angle)
