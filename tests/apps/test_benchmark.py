@@ -49,6 +49,7 @@ def test_report_of_the_networks(speed):
     printed, report = speed("inference", "gpu")
     inference = report["inference"]
     assert min(inference[name] for name in ("published_ms", "plain_ms", "engine_ms", "realtime_ms")) > 0
+    # The untrained networks of this test are too small for it.
     assert inference["reduced_ms"] is None
     assert "skipped" in printed
     assert 0 <= inference["largest_difference"] < 1e-4
@@ -60,7 +61,7 @@ def test_report_of_the_networks(speed):
 def test_report_of_perception_and_training(speed):
     _, report = speed("perception", "training")
     inference, perception = report["inference"], report["perception"]
-    assert set(inference) == {"bps_ms", "whole_ms", "realtime_whole_ms"}
+    assert set(inference) == {"bps_ms", "whole_ms", "realtime_whole_ms", "reduced_whole_ms"}
     assert min(inference["whole_ms"], inference["realtime_whole_ms"]) > inference["bps_ms"] > 0
     assert [row["weights"] for row in perception["tracking"]] == ["engine"] * 4 + ["realtime"] * 4
     stages = perception["stages"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from ffhnet.feasibility.nearest import Cells, NearestGrid
+from ffhnet.feasibility.nearest import NearestGrid
 from ffhnet.feasibility.shapes import Shapes
 from ffhnet.geometry.rotations import matrix_from_rotation_vector
 from ffhnet.geometry.transforms import make_transform
@@ -101,13 +101,3 @@ def test_grid_gives_the_nearest_point():
 def test_empty_grid_has_nothing():
     grid = NearestGrid.of(np.zeros((0, 3)), 0.02, 0.005)
     assert len(grid.look_up(np.zeros((3, 4), np.float32))[0]) == 0
-
-
-def test_cells_hold_their_points():
-    points = bottle(500).astype(np.float32)
-    cells = Cells.of(points, 0.02)
-    index = ((points - cells.origin) / np.float32(0.02)).astype(int)
-    wanted = np.unique(np.ravel_multi_index(tuple(index.T), cells.shape), return_inverse=True)
-    np.testing.assert_array_equal(np.sort(cells.occupied), wanted[0])
-    np.testing.assert_array_equal(cells.occupied[cells.member], wanted[0][wanted[1]])
-    np.testing.assert_array_equal(cells.member[cells.source], np.arange(len(cells.occupied)))

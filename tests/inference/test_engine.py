@@ -16,6 +16,7 @@ from ffhnet.inference import engine as engine_module
 from ffhnet.inference.distance_grid import GridMaker, PalmReader
 from ffhnet.inference.engine import Engine
 from ffhnet.inference.ffhnet import REALTIME, find_weights
+from ffhnet.inference.precision import product_dtype
 from ffhnet.model import CheckpointInfo, FFHEvaluator, FFHGenerator, GraspTensors, ModelConfig, ObjectTensors
 from ffhnet.model.checkpoint import Checkpoint, load_checkpoint
 from ffhnet.model.flow import FlowGenerator
@@ -168,21 +169,48 @@ def test_same_answers_as_the_plain_modules(name: str):
         assert_same_answers(checkpoint, make_objects(CONFIGS[name], seed), num=70)
 
 
+def cylinder() -> ObjectTensors:
+    """A can that stands on the table."""
+    angle, height = torch.linspace(-1.6, 1.6, 30), torch.linspace(-0.07, 0.07, 20)
+    x, y = -0.035 * angle.cos(), 0.035 * angle.sin()
+    cloud = torch.stack([x.repeat(20), y.repeat(20), height.repeat_interleave(30)], dim=-1)
+    basis = torch.from_numpy(basis_points().copy()).float()
+    return ObjectTensors(torch.cdist(basis, cloud).amin(dim=-1)[None], torch.tensor([-0.075]))
+
+
 @pytest.mark.parametrize("weights", [None, REALTIME])
 def test_same_answers_with_the_packages_weights(weights: str | None):
     checkpoint = load_checkpoint(find_weights(weights))
-    angle, height = torch.linspace(-1.6, 1.6, 30), torch.linspace(-0.07, 0.07, 20)
-    x, y = -0.035 * angle.cos(), 0.035 * angle.sin()
-    cylinder = torch.stack([x.repeat(20), y.repeat(20), height.repeat_interleave(30)], dim=-1)
-    basis = torch.from_numpy(basis_points().copy()).float()
-    objects = ObjectTensors(torch.cdist(basis, cylinder).amin(dim=-1)[None], torch.tensor([-0.075]))
     # How much trained networks tell these grasps apart is not this test's matter.
-    assert_same_answers(checkpoint, objects, num=200, spread=0)
+    assert_same_answers(checkpoint, cylinder(), num=200, spread=0)
 
 
 @pytest.mark.parametrize("name", FULL)
 def test_same_answers_at_full_size(name: str):
     assert_same_answers(make_checkpoint(FULL[name]), make_objects(FULL[name]), num=50)
+
+
+@pytest.mark.parametrize("dtype", [torch.bfloat16, torch.float16])
+def test_reduced_precision_gives_nearly_the_same_grasps(dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch):
+    checkpoint, objects = load_checkpoint(find_weights(None)), cylinder()
+    exact = Engine(checkpoint).look(objects)
+    monkeypatch.setattr(engine_module, "product_dtype", lambda *_: dtype)
+    reduced = Engine(checkpoint, "reduced").look(objects)
+    wanted, got = (seen.sample(100, torch.Generator().manual_seed(0)) for seen in (exact, reduced))
+    off = (got.position - wanted.position).norm(dim=-1)
+    assert 0 < off.mean() < 5e-4
+    assert torch.equal(exact.rate(wanted).robust.argsort()[0, -1:], exact.rate(got).robust.argsort()[0, -1:])
+
+
+def test_precision_is_reduced_only_where_it_pays(monkeypatch: pytest.MonkeyPatch):
+    cpu, gpu = torch.device("cpu"), torch.device("cuda")
+    assert product_dtype("exact", 384, gpu) == product_dtype("reduced", 128, gpu) == torch.float32
+    assert product_dtype("reduced", 384, gpu) == torch.float16
+    for instructions, dtype in (({"avx512_bf16": True}, torch.bfloat16), ({"avx2": True}, torch.float32)):
+        monkeypatch.setattr(torch.cpu, "get_capabilities", lambda found=instructions: found, raising=False)
+        assert product_dtype("reduced", 384, cpu) == dtype
+    with pytest.raises(OptionError, match="one of exact, reduced, got 'fp8'"):
+        product_dtype("fp8", 384, cpu)
 
 
 def test_chunks_join_to_the_same_grasps(monkeypatch: pytest.MonkeyPatch):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from ffhnet.apps.console import absent
 from ffhnet.errors import OptionError
@@ -61,6 +61,8 @@ class NetworkOptions:
     """Folder of trained weights, or "realtime": small networks that come with the package, too."""
     hand: Annotated[str | None, absent("NAME", "the one that the weights are for")] = None
     """Name or TOML file of the hand."""
+    precision: Literal["exact", "reduced"] = "exact"
+    """Reduced is faster with large networks where the processor multiplies 16-bit numbers, else the same."""
 
 
 def load_network(options: NetworkOptions) -> tuple[FFHNet, Hand]:
@@ -69,7 +71,9 @@ def load_network(options: NetworkOptions) -> tuple[FFHNet, Hand]:
     from ffhnet.inference import FFHNet
 
     wanted = None if options.hand is None else load_hand(options.hand)
-    network = FFHNet.from_pretrained(options.weights, hand=wanted.name if wanted else None)
+    network = FFHNet.from_pretrained(
+        options.weights, hand=wanted.name if wanted else None, precision=options.precision
+    )
     return network, wanted or load_hand(network.info.hand)
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int
+
+from ffhnet.perception.cells import Cells
 
 
 @dataclass(frozen=True)
@@ -47,11 +48,10 @@ class NearestGrid:
         counts = np.bincount(cells.member)
         means = np.stack([np.bincount(cells.member, points[:, axis]) for axis in range(3)], axis=1)
         means = (means / counts[:, None]).astype(np.float32)
-        nearest, (_, ny, nz) = np.zeros(np.prod(cells.shape), dtype=np.int32), cells.shape
+        nearest = np.zeros_like(cells.number)
         numbers = np.arange(1, len(means) + 1, dtype=np.int32)
         # Far cells are written first, so that the nearest stays.
-        x, y, z = _ball(reach / cell).T
-        steps = (x * ny + y) * nz + z
+        steps = cells.steps(reach / cell + 0.5)
         nearest[(steps[:, None] + cells.occupied).ravel()] = np.tile(numbers, len(steps))
         return cls(means, cells.source, cell, cells.origin, cells.shape, nearest)
 
@@ -67,47 +67,3 @@ class NearestGrid:
         found = self.nearest.take((x * ny + y) * nz + z)
         hit = np.flatnonzero(found)
         return left.take(hit), found.take(hit) - 1
-
-
-@dataclass(frozen=True)
-class Cells:
-    """Points sorted into the cells of a grid.
-
-    Attributes:
-        origin: corner of the first cell, m.
-        shape: number of cells along each axis.
-        occupied: index of each cell that holds points, z fastest.
-        member: for each point, the place of its cell in `occupied`.
-        source: index of one of the points of each occupied cell.
-    """
-
-    origin: Float[np.ndarray, " 3"]
-    shape: tuple[int, int, int]
-    occupied: Int[np.ndarray, " M"]
-    member: Int[np.ndarray, " N"]
-    source: Int[np.ndarray, " M"]
-
-    @classmethod
-    def of(cls, points: Float[np.ndarray, "N 3"], cell: float, border: int = 0) -> Cells:
-        """Cells of a side (m) around points (m), with empty ones around them; at least one point."""
-        origin = points.min(axis=0) - border * np.float32(cell)
-        cells = ((points - origin) * np.float32(1 / cell)).astype(np.int32)
-        nx, ny, nz = (int(n) for n in cells.max(axis=0) + border + 1)
-        keys = (cells[:, 0] * ny + cells[:, 1]) * nz + cells[:, 2]
-        # As `np.unique`, without sorting: of the points of a cell the last one stays.
-        last, numbers = np.zeros(nx * ny * nz, dtype=np.int32), np.arange(len(points), dtype=np.int32)
-        last[keys] = numbers
-        source = np.flatnonzero(last[keys] == numbers)
-        last[keys[source]] = np.arange(len(source))
-        return cls(origin, (nx, ny, nz), keys[source], last[keys], source)
-
-
-@lru_cache(maxsize=8)
-def _ball(radius: float) -> Int[np.ndarray, "S 3"]:
-    """Steps to all cells within a radius (in cells), far ones first."""
-    reach = int(np.ceil(radius))
-    steps = np.stack(np.meshgrid(*[np.arange(-reach, reach + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    length = np.linalg.norm(steps, axis=1)
-    kept = np.argsort(-length, kind="stable")
-    kept = kept[length[kept] <= radius + 0.5]
-    return steps[kept]

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ffhnet.feasibility.nearest import Cells, NearestGrid
+from ffhnet.feasibility.nearest import NearestGrid
 from ffhnet.geometry.transforms import invert
+from ffhnet.perception.cells import Cells
 from ffhnet.perception.observation import Observation
 
 _OBSTACLE_HEIGHT = 0.012

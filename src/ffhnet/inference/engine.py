@@ -18,6 +18,7 @@ from ffhnet.errors import OptionError
 from ffhnet.inference.block_engine import DecoderEngine, EvaluatorEngine
 from ffhnet.inference.distance_grid import GridMaker
 from ffhnet.inference.flow_engine import FlowEngine
+from ffhnet.inference.precision import Precision, product_dtype
 from ffhnet.model.checkpoint import Checkpoint
 from ffhnet.model.evaluator import EvaluatorLogits
 from ffhnet.model.flow import FlowGenerator
@@ -31,9 +32,13 @@ class Engine:
     """Both networks of a checkpoint, as they are now: training them further does not reach the engine.
 
     One engine may be used by several threads.
+
+    Args:
+        checkpoint: the networks.
+        precision: of the products in the flow; all else is exact.
     """
 
-    def __init__(self, checkpoint: Checkpoint):
+    def __init__(self, checkpoint: Checkpoint, precision: Precision = "exact"):
         generator, evaluator = checkpoint.generator, checkpoint.evaluator
         if generator.training or evaluator.training:
             raise OptionError("an engine wants networks in evaluation mode: call .eval() first")
@@ -42,9 +47,12 @@ class Engine:
         geometry = evaluator.geometry
         with torch.inference_mode():
             self._generator: FlowEngine | DecoderEngine
-            self._generator = (
-                FlowEngine(generator) if isinstance(generator, FlowGenerator) else DecoderEngine(generator)
-            )
+            if isinstance(generator, FlowGenerator):
+                device = generator.frequency.device
+                dtype = product_dtype(precision, generator.config.flow_width, device)
+                self._generator = FlowEngine(generator, dtype)
+            else:
+                self._generator = DecoderEngine(generator)
             self._evaluator = EvaluatorEngine(evaluator)
             self._grid = None if geometry is None else GridMaker(geometry.field)
         buffers = [list(condition.buffers()) for condition in self._conditions]

@@ -18,6 +18,7 @@ from ffhnet.hands import DEFAULT_HAND
 from ffhnet.inference import hub
 from ffhnet.inference.engine import Engine, SeenObject
 from ffhnet.inference.novelty import novelty
+from ffhnet.inference.precision import Precision
 from ffhnet.inference.risk import RiskControl
 from ffhnet.inference.weights_calibration import WeightsCalibration, load_calibration
 from ffhnet.model.checkpoint import Checkpoint, CheckpointInfo, load_checkpoint
@@ -47,13 +48,14 @@ class FFHNet:
         checkpoint: Checkpoint,
         device: torch.device | str = "cpu",
         calibration: WeightsCalibration | None = None,
+        precision: Precision = "exact",
     ):
         self.calibration = calibration
         self.info: CheckpointInfo = checkpoint.info
         self.device = torch.device(device)
         self.generator = checkpoint.generator.to(self.device)
         self.evaluator = checkpoint.evaluator.to(self.device)
-        self._engine = Engine(checkpoint)
+        self._engine = Engine(checkpoint, precision)
         self._looked: tuple[weakref.ref[Observation], SeenObject] | None = None
         self._joint_lower = np.array(self.info.joint_lower)
         self._joint_upper = np.array(self.info.joint_upper)
@@ -64,6 +66,7 @@ class FFHNet:
         path_or_name: str | Path | None = None,
         hand: str | None = None,
         device: torch.device | str | None = None,
+        precision: Precision = "exact",
     ) -> FFHNet:
         """Load trained weights.
 
@@ -71,6 +74,8 @@ class FFHNet:
             path_or_name: as in `find_weights`; None takes the package's own for the hand.
             hand: name of the hand that the weights must be for; None takes any.
             device: None takes CUDA where there is one, else the CPU.
+            precision: "reduced" is faster where the processor has instructions for it (`precision.py`); the
+                grasps are the same within a millimetre or so, and nearly always the same one is best.
 
         Raises:
             WeightsError: missing or damaged weights, or those of another hand.
@@ -79,7 +84,7 @@ class FFHNet:
         if device is None:
             device = "cuda" if torch.cuda.is_available() else "cpu"
         folder = find_weights(path_or_name, hand)
-        return cls(load_checkpoint(folder, hand=hand), device, load_calibration(folder))
+        return cls(load_checkpoint(folder, hand=hand), device, load_calibration(folder), precision)
 
     def grasp(
         self,

@@ -27,12 +27,21 @@ class FlowView:
 
 
 class FlowEngine:
-    """The sampling of a trained `FlowGenerator`, step by step the same numbers up to rounding."""
+    """The sampling of a trained `FlowGenerator`, step by step the same numbers up to rounding.
 
-    def __init__(self, network: FlowGenerator):
+    Args:
+        network: the trained network.
+        dtype: of the products in its blocks, but for the first step, whose errors grow in all others.
+    """
+
+    def __init__(self, network: FlowGenerator, dtype: torch.dtype = torch.float32):
         self._network = network
         self._blocks = [block for block in network.blocks if isinstance(block, FlowBlock)]
+        exact, reduced = (
+            [(block, *_products(block, kind)) for block in self._blocks] for kind in (torch.float32, dtype)
+        )
         self._steps = network.config.flow_steps
+        self._products = [exact, *([reduced] * (self._steps - 1))]
         time = torch.arange(self._steps, device=network.frequency.device) / self._steps
         angle = time.unsqueeze(-1) * network.frequency
         self._clock = network.time_layer(torch.cat([angle.sin(), angle.cos()], dim=-1))
@@ -71,19 +80,24 @@ class FlowEngine:
         state = seen[:, :width]
         state.copy_(noise)
         hidden = noise.new_empty(num, n.config.flow_width)
-        inner = torch.empty_like(hidden)
         for step in range(self._steps):
             if self._reader is not None and view.grid is not None:
                 pose = state[:, :9] * n.deviation[:9] + n.mean[:9]
                 position = pose[:, 6:] * n.config.position_scale
                 self._reader.write(view.grid, rotation_from_6d(pose[:, :6]), position, seen[:, width:])
             torch.addmm(self._first_bias, seen, self._first_weight.T, out=hidden)
-            for b, block in enumerate(self._blocks):
+            for b, (block, first, bias, second) in enumerate(self._products[step]):
                 normed = functional.layer_norm(
                     hidden, hidden.shape[1:], view.scale[step, b], view.shift[step, b], block.norm.eps
                 )
-                torch.addmm(block.first.bias, normed, block.first.weight.T, out=inner)
-                functional.silu(inner, inplace=True)
-                hidden.add_(block.second.bias).addmm_(inner, block.second.weight.T)
+                inner = functional.silu(functional.linear(normed.to(first.dtype), first, bias), inplace=True)
+                # What the blocks add up stays in full precision.
+                hidden.add_(block.second.bias).add_(functional.linear(inner, second))
             state.add_(n.head(hidden), alpha=1 / self._steps)
         return n.grasps(state.unsqueeze(0))
+
+
+def _products(block: FlowBlock, dtype: torch.dtype) -> tuple[Tensor, Tensor, Tensor]:
+    """First weight and bias and second weight of a block."""
+    first, second = block.first, block.second
+    return first.weight.to(dtype), first.bias.to(dtype), second.weight.to(dtype)

@@ -6,9 +6,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy import ndimage, sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, QhullError, cKDTree
+from scipy.spatial import ConvexHull, QhullError
 
 from ffhnet.errors import SceneError
+from ffhnet.perception.cells import Cells
 from ffhnet.perception.cloud import MIN_POINTS, bounding_box, search_tree
 from ffhnet.perception.hanging import join_hanging
 from ffhnet.perception.table import Plane
@@ -106,7 +107,7 @@ def _is_cut_off(members: Int[np.ndarray, " M"], cloud: Float[np.ndarray, "N 3"])
     rest = np.ones(len(cloud), dtype=bool)
     rest[members] = False
     some = slice(None, None, 1 + len(cloud) // _TABLE_SAMPLE)
-    view = _bearings(cloud[some].compress(rest[some], axis=0))
+    view = _bearings(cloud[some]).compress(rest[some], axis=1)
     bearings = _bearings(cloud.take(members, axis=0))
     low = np.abs(bearings.min(axis=1) - view.min(axis=1)) < _BORDER
     high = np.abs(bearings.max(axis=1) - view.max(axis=1)) < _BORDER
@@ -132,8 +133,10 @@ def _inside(points: Float[np.ndarray, "N 2"], table: Float[np.ndarray, "M 2"]) -
         return np.zeros(len(points), dtype=bool)
     middle = np.median(table, axis=0)
     half = int(_MAP_SIZE / 2 / _CELL)
-    edges = (np.arange(2 * half + 1) - half) * _CELL
-    seen = np.histogramdd(table - middle, bins=[edges, edges])[0] > 0
+    x, y = np.floor((table - middle).T / _CELL).astype(int) + half
+    on_map = (np.minimum(x, y) >= 0) & (np.maximum(x, y) < 2 * half)
+    seen = np.zeros((2 * half, 2 * half), dtype=bool)
+    seen[x[on_map], y[on_map]] = True
     # One cell of closing joins table parts that a thin shadow separates.
     pieces, _ = ndimage.label(ndimage.binary_dilation(seen), structure=np.ones((3, 3)))
     largest = 1 + int(np.argmax(np.bincount(pieces.ravel())[1:]))
@@ -147,19 +150,20 @@ def _inside(points: Float[np.ndarray, "N 2"], table: Float[np.ndarray, "M 2"]) -
 
 def _clusters(points: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
     """Label of each point's Euclidean cluster, -1 for stray points."""
-    cells = np.floor((points - bounding_box(points)[0]) / _VOXEL).astype(int)
-    # One number per voxel, because sorting rows is slow.
-    keys = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
-    _, first, voxel_of, counts = np.unique(keys, return_index=True, return_inverse=True, return_counts=True)
-    cells = cells[first]
-    n = len(cells)
-    pairs = cKDTree(cells * _VOXEL).query_pairs(_LINK, output_type="ndarray")
-    links = sparse.coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n)).tocsr()
+    reach = _LINK / _VOXEL
+    cells = Cells.of(points, _VOXEL, border=int(np.ceil(reach)))
+    counts = np.bincount(cells.member)
+    steps = cells.steps(reach)
+    # Each pair of neighbours once.
+    near = cells.number[cells.occupied[:, None] + steps[steps > 0]]
+    linked = near > 0
+    ends = np.append(0, np.cumsum(np.count_nonzero(linked, axis=1)))
+    links = sparse.csr_matrix((np.ones(ends[-1]), near[linked] - 1, ends), shape=(len(counts), len(counts)))
     _, component = connected_components(links, directed=False)
     density = counts + links @ counts + links.T @ counts
     usual = ndimage.median(density, component, np.arange(component.max() + 1))
     component[density < _MIN_DENSITY * usual[component]] = -1
-    return component[voxel_of]
+    return component[cells.member]
 
 
 def _with_low_points(

@@ -7,7 +7,7 @@ every grasp, in the plain modules. Its weights are random, which changes nothing
 from __future__ import annotations
 
 import resource
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -16,13 +16,14 @@ import torch
 
 from ffhnet.apps.speed.clock import Clock, Times
 from ffhnet.inference.engine import Engine
+from ffhnet.inference.precision import product_dtype
 from ffhnet.model.checkpoint import Checkpoint
 from ffhnet.model.config import ModelConfig
 from ffhnet.model.evaluator import EvaluatorLogits, FFHEvaluator
 from ffhnet.model.generator import FFHGenerator
 from ffhnet.model.tensors import GraspTensors, ObjectTensors
 
-NO_REDUCED = "without AVX-512, int8 is slower than fp32 at the widths of small networks, and bf16 at any"
+NO_REDUCED = "this processor has no instructions for products of bfloat16, or the generator is small"
 
 Answer = tuple[GraspTensors, EvaluatorLogits]
 
@@ -87,6 +88,8 @@ def measure_networks(
 ) -> tuple[dict[str, Times], dict[str, Any]]:
     """Times of all ways, and figures of the contract: medians, factors, the largest difference."""
     engines = {"engine": Engine(checkpoint), "realtime": Engine(realtime)}
+    if has_reduced(checkpoint):
+        engines["reduced"] = Engine(checkpoint, "reduced")
     ways = {
         "published": published(objects, num),
         "plain": plain(checkpoint, objects, num),
@@ -102,8 +105,7 @@ def measure_networks(
     slow = times["published"]
     figures = {
         **{f"{name}_ms": times[name].median for name in ways},
-        "reduced_ms": None,
-        "reduced_skipped": NO_REDUCED,
+        **_reduced_figures(times),
         "times_faster_than_published": times["engine"].times_faster(slow),
         "times_faster_than_plain": times["engine"].times_faster(times["plain"]),
         "realtime_times_faster_than_published": times["realtime"].times_faster(slow),
@@ -112,6 +114,24 @@ def measure_networks(
         ),
     }
     return times, figures
+
+
+def has_reduced(checkpoint: Checkpoint) -> bool:
+    """Whether reduced precision makes a difference for a generator on this processor."""
+    config = checkpoint.info.model
+    width = config.flow_width if config.generator == "flow" else 0
+    return product_dtype("reduced", width, torch.device("cpu")) != torch.float32
+
+
+def _reduced_figures(times: Mapping[str, Times]) -> dict[str, Any]:
+    if "reduced" not in times:
+        return {"reduced_ms": None, "reduced_skipped": NO_REDUCED}
+    reduced = times["reduced"]
+    return {
+        "reduced_ms": reduced.median,
+        "reduced_times_faster_than_published": reduced.times_faster(times["published"]),
+        "reduced_times_faster_than_exact": reduced.times_faster(times["engine"]),
+    }
 
 
 @torch.inference_mode()

@@ -13,7 +13,7 @@ import torch
 from ffhnet.apps.console import busy, print_table
 from ffhnet.apps.speed.clock import Clock, Times
 from ffhnet.apps.speed.gpu import measure_gpu
-from ffhnet.apps.speed.networks import measure_counts, measure_networks
+from ffhnet.apps.speed.networks import has_reduced, measure_counts, measure_networks
 from ffhnet.apps.speed.pipeline import (
     measure_encodings,
     measure_pipeline,
@@ -77,7 +77,7 @@ def _startup() -> dict[str, dict[str, float]]:
 
 def _perception(
     options: BenchmarkOptions, weights: Path, clock: Clock
-) -> tuple[dict[str, Any], dict[str, float]]:
+) -> tuple[dict[str, Any], dict[str, float | None]]:
     """Figures of perception, and those of the whole way, which count as inference."""
     with busy("stages"):
         encoder = use_compiled_encoder()
@@ -85,6 +85,8 @@ def _perception(
             "engine": FFHNet.from_pretrained(weights, device="cpu"),
             REALTIME: FFHNet.from_pretrained(REALTIME, device="cpu"),
         }
+        if has_reduced(load_checkpoint(weights)):
+            networks["reduced"] = FFHNet.from_pretrained(weights, device="cpu", precision="reduced")
         times = measure_pipeline(networks, options.grasps, clock)
         tracking = measure_tracking(networks, clock)
         encodings = measure_encodings(options.points, clock)
@@ -115,6 +117,7 @@ def _perception(
         "bps_ms": times["bps"].median,
         "whole_ms": whole["engine"],
         "realtime_whole_ms": whole[REALTIME],
+        "reduced_whole_ms": whole.get("reduced"),
     }
 
 
@@ -132,10 +135,14 @@ def _inference(
         "its own plain modules": "times_faster_than_plain",
         "the published way, with the weights realtime": "realtime_times_faster_than_published",
     }
+    if figures["reduced_ms"] is None:
+        print(f"reduced precision: skipped, {figures['reduced_skipped']}")
+    else:
+        factors["the published way, in reduced precision"] = "reduced_times_faster_than_published"
+        factors["itself, in reduced precision"] = "reduced_times_faster_than_exact"
     rows = [[name, f"{figures[key]:.2f}"] for name, key in factors.items()]
     print_table("The engine", ("against", "times as fast"), rows)
     print(f"largest difference from the plain modules: {figures['largest_difference']:.1e}")
-    print(f"reduced precision: skipped, {figures['reduced_skipped']}")
     columns = ("grasps", "ms", "µs per grasp", "peak memory (MiB)")
     rows = [
         [f"{value:.0f}" if i != 2 else f"{value:.1f}" for i, value in enumerate(row.values())]
