@@ -26,6 +26,7 @@ FEW = {
         "--rounds": 1,
     },
     "train": {"--steps": 2, "--threads": 1},
+    "refine": {"--steps": 2, "--threads": 1},
     "distil": {"--steps": 2, "--threads": 1},
     "calibrate": {
         "--objects": "procedural-val:4",

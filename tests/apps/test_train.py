@@ -1,4 +1,4 @@
-"""`ffhnet train` and `ffhnet distil`: from a data set to weights that `ffhnet grasp` takes."""
+"""`ffhnet train`, `refine` and `distil`: from a data set to weights that `ffhnet grasp` takes."""
 
 import json
 from pathlib import Path
@@ -14,7 +14,7 @@ def trained(tmp_path_factory):
     return tmp_path_factory.mktemp("trained") / "weights"
 
 
-def test_train_distil_and_grasp(ffhnet, trained, tmp_path, depth_png):
+def test_train_refine_distil_and_grasp(ffhnet, trained, tmp_path, depth_png):
     status, printed, err = ffhnet("train", DATA, "--val", DATA, "--out", trained, *FEW)
     assert (status, err) == (0, "")
     assert printed.startswith("24 objects, ")
@@ -25,6 +25,17 @@ def test_train_distil_and_grasp(ffhnet, trained, tmp_path, depth_png):
     assert ffhnet("train", DATA, "--out", trained, *FEW)[0] == 0
     assert (trained / "generator.safetensors").read_bytes() == before
 
+    refined = tmp_path / "refined"
+    status, _, err = ffhnet(
+        "refine", DATA, "--weights", trained, "--out", refined, "--temperature", 0.9, *FEW
+    )
+    assert (status, err) == (0, "")
+    assert json.loads((refined / "config.json").read_text())["model"]["temperature"] == 0.9
+    assert (refined / "evaluator.safetensors").read_bytes() == (
+        trained / "evaluator.safetensors"
+    ).read_bytes()
+    assert (refined / "generator.safetensors").read_bytes() != before
+
     small = tmp_path / "small"
     distil = ("distil", DATA, "--weights", trained, "--out", small, "--guidance", 0.5)
     status, _, err = ffhnet(*distil, *FEW)
@@ -33,7 +44,7 @@ def test_train_distil_and_grasp(ffhnet, trained, tmp_path, depth_png):
     for name in ("generator.safetensors", "evaluator.safetensors"):
         assert (small / name).stat().st_size < 0.5 * (trained / name).stat().st_size
 
-    for weights in (trained, small):
+    for weights in (trained, refined, small):
         out = tmp_path / "grasps.json"
         # What hardly trained networks propose need not be feasible.
         scene = ("grasp", depth_png, "--intrinsics", 600, 600, 320, 240, "--num", 5, "--no-feasibility")
@@ -46,6 +57,8 @@ def test_train_distil_and_grasp(ffhnet, trained, tmp_path, depth_png):
     [
         (("train", DATA, "--steps", 0), "--threads and --steps must be at least 1"),
         (("train", "nowhere"), "nowhere"),
+        (("refine", DATA, "--weights", "nowhere"), "no weights in nowhere"),
+        (("refine", DATA, "--weights", "nowhere", "--belief", -1), "--belief is a power of at least 0"),
         (("distil", DATA, "--weights", "nowhere"), "no weights in nowhere"),
         (("distil", DATA, "--weights", "nowhere", "--guidance", -1), "--guidance at least 0"),
     ],
@@ -57,9 +70,10 @@ def test_bad_input(ffhnet, tmp_path, arguments, message):
     assert not (tmp_path / "weights").exists()
 
 
-def test_a_cvae_cannot_be_distilled(ffhnet, tmp_path):
+def test_a_cvae_can_be_neither_refined_nor_distilled(ffhnet, tmp_path):
     weights = tmp_path / "cvae"
     assert ffhnet("train", DATA, "--generator", "cvae", "--out", weights, *FEW)[0] == 0
-    status, _, err = ffhnet("distil", DATA, "--weights", weights, "--out", tmp_path / "small", *FEW)
-    assert (status, err.count("\n")) == (2, 1)
-    assert "holds a cvae" in err
+    for command in ("refine", "distil"):
+        status, _, err = ffhnet(command, DATA, "--weights", weights, "--out", tmp_path / "new", *FEW)
+        assert (status, err.count("\n")) == (2, 1)
+        assert "holds a cvae" in err

@@ -73,9 +73,13 @@ def test_untrained_flow_carries_noise_nowhere_and_the_loss_is_that_of_a_zero_vel
     module.set_statistics(wanted)
     noise, time = torch.randn(2, 500, 11, generator=source(3)), torch.rand(2, generator=source(4))
     torch.nn.init.zeros_(module.head.bias)
-    loss = module.loss(objects(2), wanted, noise, time)
-    state = (module._raw(wanted) - module.mean) / module.deviation
+    loss = module.loss(objects(2), module.states(wanted), noise, time)
+    state = module.states(wanted)
+    torch.testing.assert_close(module.grasps(state).position, wanted.position)
     torch.testing.assert_close(loss, (state - noise).square().mean())
+    weight = torch.tensor([2.0, 0.0]).expand(500, 2).T
+    first = module.loss(objects(2), state, noise, time, weight)
+    torch.testing.assert_close(first, (state - noise)[0].square().mean())
 
 
 def test_flow_learns_two_grasps_per_object_and_not_their_mean():
@@ -93,7 +97,7 @@ def test_flow_learns_two_grasps_per_object_and_not_their_mean():
 
     module.set_statistics(batch())
     for _ in range(800):
-        loss = module.loss(views, batch(), torch.randn(16, 32, 11), torch.rand(16))
+        loss = module.loss(views, module.states(batch()), torch.randn(16, 32, 11), torch.rand(16))
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()

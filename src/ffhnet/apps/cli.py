@@ -29,6 +29,7 @@ from ffhnet.apps import (
     grasp,
     hand,
     objects,
+    refine,
     train,
     view,
 )
@@ -53,6 +54,7 @@ COMMANDS = (
     Command("generate", generate.GenerateOptions, generate.run),
     Command("data", data.DataOptions, data.run),
     Command("train", train.TrainOptions, train.run),
+    Command("refine", refine.RefineOptions, refine.run),
     Command("distil", distil.DistilOptions, distil.run),
     Command("calibrate", calibrate.CalibrateOptions, calibrate.run),
     Command("evaluate", evaluate.EvaluateOptions, evaluate.run),

@@ -94,15 +94,23 @@ class FlowGenerator(nn.Module):
     def loss(
         self,
         objects: ObjectTensors,
-        grasps: GraspTensors,
+        states: Float[Tensor, "V G S"],
         noise: Float[Tensor, "V G S"],
         time: Float[Tensor, " V"],
+        weight: Float[Tensor, "V G"] | None = None,
     ) -> Float[Tensor, ""]:
-        """Mean square error of the velocity at each view's time along straight paths."""
-        grasp = (self._raw(grasps) - self.mean) / self.deviation
+        """Mean square error of the velocity at each view's time along straight paths from noise to states.
+
+        With weights, of mean 1, some states count more than others.
+        """
         t = time[:, None, None]
-        view = self._look(objects)
-        return functional.mse_loss(self._velocity(view, (1 - t) * noise + t * grasp, time), grasp - noise)
+        velocity = self._velocity(self._look(objects), (1 - t) * noise + t * states, time)
+        off = (velocity - (states - noise)).square()
+        return off.mean() if weight is None else (weight * off.mean(dim=-1)).mean()
+
+    def states(self, grasps: GraspTensors) -> Float[Tensor, "V G S"]:
+        """The states that stand for grasps; `grasps` is the way back."""
+        return (self._raw(grasps) - self.mean) / self.deviation
 
     def sample(self, objects: ObjectTensors, num: int, source: torch.Generator) -> GraspTensors:
         """`num` grasps for each view by `flow_steps` Euler steps; joint angles are not clipped.

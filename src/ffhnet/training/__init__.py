@@ -5,6 +5,7 @@ from ffhnet.training.train import (
     LookPoints,
     distill_evaluator,
     distill_generator,
+    refine_generator,
     train_evaluator,
     train_generator,
 )
@@ -15,6 +16,7 @@ __all__ = [
     "TrainingConfig",
     "distill_evaluator",
     "distill_generator",
+    "refine_generator",
     "train_evaluator",
     "train_generator",
 ]

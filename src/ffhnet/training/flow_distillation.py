@@ -15,27 +15,19 @@ from functools import cached_property
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from torch import Tensor
-from torch.nn import functional
 
 from ffhnet.dataset.training_data import TrainingData
 from ffhnet.errors import OptionError
 from ffhnet.model.evaluator import FFHEvaluator
 from ffhnet.model.flow import FlowGenerator
-from ffhnet.model.tensors import GraspTensors, ObjectTensors
-from ffhnet.training.batches import view_tensors
 from ffhnet.training.config import TrainingConfig
+from ffhnet.training.judged_flow import CHUNK, JudgedFlow
 from ffhnet.training.loop import seeded
 
-CHUNK = 64
-"""Views whose paths the teacher computes at once."""
 
-HELD_OUT_VIEWS, HELD_OUT_GRASPS = 128, 32
-"""Size of the held-out measurement."""
-
-
-class FlowDistillationTask:
+class FlowDistillationTask(JudgedFlow):
     """Learn a teacher's paths on the views of a data set, guided by an evaluator.
 
     Args:
@@ -61,14 +53,7 @@ class FlowDistillationTask:
         steps, taught = module.config.flow_steps, teacher.config.flow_steps
         if taught % steps:
             raise OptionError(f"a teacher of {taught} steps cannot teach {steps}: wanted a multiple")
-        self.module = module
-        self.config = config
-        self._device = next(module.parameters()).device
-        self._evaluator = evaluator.to(self._device).eval().requires_grad_(False)
-        self._lower, self._upper = (limit.to(self._device) for limit in joint_limits)
-        self._data = data
-        self._held_out = held_out
-        self._teacher = teacher.to(self._device).eval()
+        super().__init__(module, teacher, evaluator, joint_limits, config, data, held_out)
 
     def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         """Distance to the teacher's states and, after the start, what the evaluator says of the grasps."""
@@ -83,22 +68,9 @@ class FlowDistillationTask:
         distance = (belief * off).sum() / belief.sum()
         if self.config.guidance == 0 or step < self.config.guidance_start * self.config.steps:
             return distance, {"loss": distance.item(), "distance": distance.item()}
-        blame = self._doubt(objects, reached[:, -1]).mean()
+        blame = self._doubt(objects, self.module.grasps(reached[:, -1])).mean()
         total = distance + self.config.guidance * blame
         return total, {"loss": total.item(), "distance": distance.item(), "blame": blame.item()}
-
-    def metrics(self) -> dict[str, float]:
-        """What the evaluator says of samples on held-out views."""
-        if self._held_out is None:
-            return {}
-        self.module.eval()
-        with torch.inference_mode(), seeded(self.config.seed) as rng:
-            views = rng.choice(self._held_out.num_views, HELD_OUT_VIEWS)
-            objects = self._objects(self._held_out, views)
-            *_, last = self.module.path(objects, self._noise(HELD_OUT_VIEWS, HELD_OUT_GRASPS))
-            blame = self._doubt(objects, last).mean().item()
-        self.module.train()
-        return {"blame": blame}
 
     @cached_property
     def _paths(self) -> tuple[Float[np.ndarray, "V K P S"], Float[np.ndarray, "V P"]]:
@@ -111,24 +83,10 @@ class FlowDistillationTask:
         with torch.inference_mode(), seeded(self.config.seed):
             for first in range(0, count, CHUNK):
                 views = np.arange(first, min(first + CHUNK, count))
-                objects, noise = self._objects(self._data, views), self._noise(len(views), pairs)
+                objects = self._objects(self._data, views)
+                noise = self._noise(len(views), pairs, self.module.config.temperature)
                 path = list(self._teacher.path(objects, noise))[every - 1 :: every]
+                doubt = self._doubt(objects, self.module.grasps(path[-1]))
                 states[views] = torch.stack([noise, *path], dim=1).half().cpu().numpy()
-                belief[views] = torch.exp(-self._doubt(objects, path[-1])).half().cpu().numpy()
+                belief[views] = torch.exp(-doubt).half().cpu().numpy()
         return states, belief
-
-    def _noise(self, views: int, grasps: int) -> Float[Tensor, "V G S"]:
-        """What samples start from, as in use."""
-        noise = torch.randn(views, grasps, self.module.state_width)
-        return (self.module.config.temperature * noise).to(self._device)
-
-    def _doubt(self, objects: ObjectTensors, states: Float[Tensor, "V G S"]) -> Float[Tensor, "V G"]:
-        """Negative logarithm of the probability that a grasp holds, mean over the evaluator's outputs."""
-        raw = self.module.grasps(states)
-        grasps = GraspTensors(raw.rotation, raw.position, raw.joints.clamp(self._lower, self._upper))
-        logits = self._evaluator(objects, grasps)
-        outputs = [logits.success] if logits.robust is None else [logits.success, logits.robust]
-        return torch.stack([functional.softplus(-output) for output in outputs]).mean(dim=0)
-
-    def _objects(self, data: TrainingData, views: Int[np.ndarray, " V"]) -> ObjectTensors:
-        return view_tensors(data, views).to(self._device)

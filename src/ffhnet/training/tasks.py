@@ -6,6 +6,7 @@ from typing import Protocol
 
 import numpy as np
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 
 from ffhnet.dataset.training_data import TrainingData
@@ -129,10 +130,8 @@ class FlowTask(_SuccessTask):
 
     def _loss(self, batch: Batch) -> Tensor:
         noise = torch.randn(*batch.label.shape, self.module.state_width, device=self._device)
-        # A logistic normal spends more steps where noise and grasp mix than at the ends. One time for all
-        # grasps of a view saves a third of the step: they then share what the object's part computes.
-        time = torch.sigmoid(TIME_SPREAD * torch.randn(len(batch.label), device=self._device))
-        return self.module.loss(batch.objects, batch.grasps, noise, time)
+        time = flow_times(len(batch.label), self._device)
+        return self.module.loss(batch.objects, self.module.states(batch.grasps), noise, time)
 
 
 class EvaluatorTask(_BatchTask):
@@ -159,6 +158,15 @@ class EvaluatorTask(_BatchTask):
     def metrics(self) -> dict[str, float]:
         """Discrimination and calibration on held-out trials, drawn as often as they occur."""
         return {} if self._held_out is None else evaluator_metrics(self.module, self._held_out)
+
+
+def flow_times(views: int, device: torch.device) -> Float[Tensor, " V"]:
+    """The time at which each view's paths are looked at, from torch's global generator.
+
+    A logistic normal spends more steps where noise and grasp mix than at the ends. One time for all grasps of
+    a view saves a third of the step: they then share what the object's part computes.
+    """
+    return torch.sigmoid(TIME_SPREAD * torch.randn(views, device=device))
 
 
 def generator_metrics(module: FFHGenerator, batch: Batch) -> dict[str, float]:

@@ -26,6 +26,7 @@ from ffhnet.training.batches import BatchMaker
 from ffhnet.training.config import TrainingConfig
 from ffhnet.training.evaluator_distillation import EvaluatorDistillationTask
 from ffhnet.training.flow_distillation import FlowDistillationTask
+from ffhnet.training.flow_refinement import FlowRefinementTask
 from ffhnet.training.loop import fit, seeded
 from ffhnet.training.processes import ALONE, Processes
 from ffhnet.training.tasks import EvaluatorTask, FlowTask, GeneratorTask, Task
@@ -122,6 +123,41 @@ def distill_generator(
     lower, upper = (torch.tensor(limit, dtype=torch.float32) for limit in joint_limits)
     judge = copy.deepcopy(evaluator)
     task = FlowDistillationTask(module, teacher, judge, (lower, upper), part, data, val)
+    _fit_and_write(task, module, data, config, out_dir, joint_limits, progress, processes)
+    return module
+
+
+def refine_generator(
+    data: TrainingData,
+    val: TrainingData | None,
+    config: TrainingConfig,
+    out_dir: Path,
+    joint_limits: tuple[Sequence[float], Sequence[float]],
+    trained: FlowGenerator,
+    evaluator: FFHEvaluator,
+    progress: bool = True,
+    processes: Processes = ALONE,
+) -> FlowGenerator:
+    """Go on with a trained flow, by what the evaluator says of its samples (`flow_refinement.py`); write it.
+
+    Args:
+        data: views and trials to learn on.
+        val: held-out views for metrics, or None.
+        config: the run, with the flow's own architecture; the temperature may be another.
+        out_dir: as for `train_generator`.
+        joint_limits: lower and upper limits in radians.
+        trained: the flow to begin with; it is not changed.
+        evaluator: trained; it is not changed either.
+        progress: show a progress bar.
+        processes: as for `train_generator`.
+    """
+    _check_data(data, config.model)
+    module = FlowGenerator(config.model).to(processes.device)
+    module.load_state_dict(trained.state_dict())
+    part = dataclasses.replace(config, views=processes.share(config.views))
+    lower, upper = (torch.tensor(limit, dtype=torch.float32) for limit in joint_limits)
+    judge = copy.deepcopy(evaluator)
+    task = FlowRefinementTask(module, trained, judge, (lower, upper), part, data, val)
     _fit_and_write(task, module, data, config, out_dir, joint_limits, progress, processes)
     return module
 

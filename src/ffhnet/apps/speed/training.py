@@ -34,7 +34,7 @@ def measure_training(clock: Clock) -> dict[str, Times]:
 
     def flow_step() -> None:
         noise = torch.randn(VIEWS, GRASPS, flow.state_width, generator=source)
-        _step(adam_flow, flow.loss(objects, grasps, noise, torch.rand(VIEWS, generator=source)))
+        _step(adam_flow, flow.loss(objects, flow.states(grasps), noise, torch.rand(VIEWS, generator=source)))
 
     def evaluator_step() -> None:
         logits = evaluator(objects, grasps).success
