@@ -27,7 +27,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[FlowGenerator, FF
 
     data, folder = point_world(0, objects=100), tmp_path_factory.mktemp("trained")
     model = replace(MODEL, generator="flow", flow_steps=4)
-    config = TrainingConfig(model=model, steps=120, views=32, grasps=32, metrics_every=60, state_every=60)
+    config = TrainingConfig(model=model, steps=200, views=32, grasps=32, metrics_every=100, state_every=100)
     generator = train_generator(data, None, config, folder, JOINT_LIMITS, progress=False)
     assert isinstance(generator, FlowGenerator)
     return generator, train_evaluator(data, None, config, folder, JOINT_LIMITS, progress=False)
@@ -36,7 +36,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[FlowGenerator, FF
 @pytest.fixture
 def config(trained: tuple[FlowGenerator, FFHEvaluator]) -> TrainingConfig:
     refinement = TrainingConfig.refinement(trained[0].config)
-    return replace(refinement, steps=80, views=16, grasps=20, metrics_every=40, state_every=30)
+    return replace(refinement, steps=150, views=16, grasps=20, metrics_every=50, state_every=30)
 
 
 def blame(folder: Path) -> float:
