@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from training_world import JOINT_LIMITS, MODEL, killed, point_world
 
 from ffhnet.dataset.training_data import TrainingData
 from ffhnet.errors import OptionError
@@ -40,8 +41,6 @@ def run() -> TrainingConfig:
 def trained(
     tmp_path_factory: pytest.TempPathFactory, run: TrainingConfig
 ) -> tuple[FlowGenerator, FFHEvaluator]:
-    from conftest import JOINT_LIMITS, MODEL, point_world
-
     data, folder = point_world(0, objects=100), tmp_path_factory.mktemp("teacher")
     config = replace(
         run, views=32, grasps=32, steps=300, model=replace(MODEL, generator="flow", flow_steps=8)
@@ -95,22 +94,11 @@ def test_a_killed_distillation_resumes_to_the_same_weights(
     student: TrainingConfig,
     joint_limits: Limits,
     trained: tuple[FlowGenerator, FFHEvaluator],
-    monkeypatch: pytest.MonkeyPatch,
 ):
     data, config = make_world(0), replace(student, steps=90)
     whole = distill_generator(data, data, config, tmp_path / "whole", joint_limits, *trained, progress=False)
-    plain_loss = FlowDistillationTask.loss
-
-    def dies(self, step: int, rng: np.random.Generator):
-        if step == 77:
-            raise KeyboardInterrupt
-        return plain_loss(self, step, rng)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(FlowDistillationTask, "loss", dies)
-        with pytest.raises(KeyboardInterrupt):
-            distill_generator(data, data, config, tmp_path / "cut", joint_limits, *trained, progress=False)
-    torch.manual_seed(12345)
+    with killed(FlowDistillationTask, at=77):
+        distill_generator(data, data, config, tmp_path / "cut", joint_limits, *trained, progress=False)
     resumed = distill_generator(data, data, config, tmp_path / "cut", joint_limits, *trained, progress=False)
     assert all(torch.equal(whole.state_dict()[name], tensor) for name, tensor in resumed.state_dict().items())
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from training_world import JOINT_LIMITS, MODEL, killed, point_world
 
 from ffhnet.dataset.training_data import TrainingData
 from ffhnet.model.evaluator import FFHEvaluator
@@ -23,8 +24,6 @@ Limits = tuple[tuple[float, ...], tuple[float, ...]]
 
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[FlowGenerator, FFHEvaluator]:
-    from conftest import JOINT_LIMITS, MODEL, point_world
-
     data, folder = point_world(0, objects=100), tmp_path_factory.mktemp("trained")
     model = replace(MODEL, generator="flow", flow_steps=4)
     config = TrainingConfig(model=model, steps=200, views=32, grasps=32, metrics_every=100, state_every=100)
@@ -67,22 +66,11 @@ def test_a_killed_refinement_resumes_to_the_same_weights(
     config: TrainingConfig,
     joint_limits: Limits,
     trained: tuple[FlowGenerator, FFHEvaluator],
-    monkeypatch: pytest.MonkeyPatch,
 ):
     data, config = make_world(0), replace(config, steps=50)
     whole = refine_generator(data, data, config, tmp_path / "whole", joint_limits, *trained, progress=False)
-    plain_loss = FlowRefinementTask.loss
-
-    def dies(self, step: int, rng: np.random.Generator):
-        if step == 37:
-            raise KeyboardInterrupt
-        return plain_loss(self, step, rng)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(FlowRefinementTask, "loss", dies)
-        with pytest.raises(KeyboardInterrupt):
-            refine_generator(data, data, config, tmp_path / "cut", joint_limits, *trained, progress=False)
-    torch.manual_seed(12345)
+    with killed(FlowRefinementTask, at=37):
+        refine_generator(data, data, config, tmp_path / "cut", joint_limits, *trained, progress=False)
     resumed = refine_generator(data, data, config, tmp_path / "cut", joint_limits, *trained, progress=False)
     assert all(torch.equal(whole.state_dict()[name], tensor) for name, tensor in resumed.state_dict().items())
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from training_world import killed
 
 from ffhnet.dataset.training_data import TrainingData
 from ffhnet.errors import DatasetError, OptionError, WeightsError
@@ -107,17 +108,8 @@ def test_killed_run_resumes_to_the_same_weights(
     whole = train(data, data, short, tmp_path / "whole", joint_limits, progress=False)
 
     plain_loss = task_kind.loss
-
-    def dies(self, step: int, rng: np.random.Generator):
-        if step == 47:
-            raise KeyboardInterrupt
-        return plain_loss(self, step, rng)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(task_kind, "loss", dies)
-        with pytest.raises(KeyboardInterrupt):
-            train(data, data, short, tmp_path / "cut", joint_limits, progress=False)
-    torch.manual_seed(12345)  # resuming must not lean on the state of global generators
+    with killed(task_kind, at=47):
+        train(data, data, short, tmp_path / "cut", joint_limits, progress=False)
     first_step = []
 
     def watched(self, step: int, rng: np.random.Generator):

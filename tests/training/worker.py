@@ -5,8 +5,8 @@ from pathlib import Path
 
 import safetensors.torch
 import torch
-from conftest import JOINT_LIMITS, MODEL, point_world
 from torch import nn
+from training_world import JOINT_LIMITS, MODEL, point_world
 
 from ffhnet.training import TrainingConfig, train_evaluator
 from ffhnet.training.processes import Processes, joined

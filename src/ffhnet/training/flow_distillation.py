@@ -18,11 +18,6 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from ffhnet.dataset.training_data import TrainingData
-from ffhnet.errors import OptionError
-from ffhnet.model.evaluator import FFHEvaluator
-from ffhnet.model.flow import FlowGenerator
-from ffhnet.training.config import TrainingConfig
 from ffhnet.training.judged_flow import CHUNK, JudgedFlow
 from ffhnet.training.loop import seeded
 
@@ -30,30 +25,9 @@ from ffhnet.training.loop import seeded
 class FlowDistillationTask(JudgedFlow):
     """Learn a teacher's paths on the views of a data set, guided by an evaluator.
 
-    Args:
-        module: the student; it and the teacher standardise states alike.
-        teacher: a flow whose number of steps is a multiple of the student's.
-        evaluator: rates what the student proposes; neither it nor the teacher changes.
-        joint_limits: lower and upper limits (rad): the evaluator sees joints clipped to them.
-        config: the run; all processes of it see all `pairs`.
-        data: views to learn from; their trials are not looked at.
-        held_out: views to measure on, or None.
+    The teacher's number of steps is a multiple of the student's; all processes of a run see all `pairs`; the
+    trials of the data are not looked at.
     """
-
-    def __init__(
-        self,
-        module: FlowGenerator,
-        teacher: FlowGenerator,
-        evaluator: FFHEvaluator,
-        joint_limits: tuple[Float[Tensor, " J"], Float[Tensor, " J"]],
-        config: TrainingConfig,
-        data: TrainingData,
-        held_out: TrainingData | None,
-    ):
-        steps, taught = module.config.flow_steps, teacher.config.flow_steps
-        if taught % steps:
-            raise OptionError(f"a teacher of {taught} steps cannot teach {steps}: wanted a multiple")
-        super().__init__(module, teacher, evaluator, joint_limits, config, data, held_out)
 
     def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         """Distance to the teacher's states and, after the start, what the evaluator says of the grasps."""

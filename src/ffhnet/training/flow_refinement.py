@@ -16,11 +16,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from ffhnet.dataset.training_data import TrainingData
-from ffhnet.model.evaluator import FFHEvaluator
-from ffhnet.model.flow import FlowGenerator
 from ffhnet.training.batches import BatchMaker
-from ffhnet.training.config import TrainingConfig
 from ffhnet.training.judged_flow import CHUNK, JudgedFlow
 from ffhnet.training.loop import seeded
 from ffhnet.training.tasks import flow_times
@@ -34,19 +30,6 @@ OWN_SHARE = 0.6
 
 class FlowRefinementTask(JudgedFlow):
     """Flow matching on the grasps of `JudgedFlow`'s views, those first that its evaluator believes in."""
-
-    def __init__(
-        self,
-        module: FlowGenerator,
-        teacher: FlowGenerator,
-        evaluator: FFHEvaluator,
-        joint_limits: tuple[Float[Tensor, " J"], Float[Tensor, " J"]],
-        config: TrainingConfig,
-        data: TrainingData,
-        held_out: TrainingData | None,
-    ):
-        super().__init__(module, teacher, evaluator, joint_limits, config, data, held_out)
-        self._batches = BatchMaker.for_generator(data, config.min_local_success, config.min_margin)
 
     def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         """Flow matching loss of one batch, in which each view counts alike."""
@@ -71,6 +54,11 @@ class FlowRefinementTask(JudgedFlow):
         pick = (np.log(times) - log_weight[:, None]).argmin(axis=2)
         chosen = np.take_along_axis(all_states[views], pick[:, :, None], axis=1)
         return torch.from_numpy(chosen).float().to(self._device)
+
+    @cached_property
+    def _batches(self) -> BatchMaker:
+        """Successes of the data."""
+        return BatchMaker.for_generator(self._data, self.config.min_local_success, self.config.min_margin)
 
     @cached_property
     def _samples(self) -> tuple[Float[np.ndarray, "V P S"], Float[np.ndarray, "V P"]]:

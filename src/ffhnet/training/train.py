@@ -114,8 +114,14 @@ def distill_generator(
         evaluator: trained; it guides, and is not changed either.
         progress: show a progress bar.
         processes: as for `train_generator`.
+
+    Raises:
+        OptionError: the teacher does not pass the times of its student.
     """
     _check_data(data, config.model)
+    steps, taught = config.model.flow_steps, teacher.config.flow_steps
+    if taught % steps:
+        raise OptionError(f"a teacher of {taught} steps cannot teach {steps}: wanted a multiple")
     with seeded(config.seed):
         module = FlowGenerator(config.model).to(processes.device)
     module.take_constants(teacher)
