@@ -36,8 +36,8 @@ class FlowRefinementTask(JudgedFlow):
         own = round(OWN_SHARE * self.config.grasps)
         batch = self._batches.draw(rng, self.config.views, self.config.grasps - own).to(self._device)
         with torch.no_grad():
-            weight = torch.exp(-self.config.belief * self._doubt(batch.objects, batch.grasps))
-        weight = weight / weight.mean(dim=1, keepdim=True)
+            log_weight = -self.config.belief * self._doubt(batch.objects, batch.grasps)
+        weight = log_weight.softmax(dim=1) * log_weight.shape[1]
         grasps = torch.cat([self.module.states(batch.grasps), self._own(rng, batch.views, own)], dim=1)
         weight = torch.cat([weight, torch.ones(len(weight), own, device=self._device)], dim=1)
         noise = torch.randn(grasps.shape).to(self._device)
