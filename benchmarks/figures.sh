@@ -17,7 +17,7 @@ evaluate() {  # NAME OPTIONS...
 
 [[ -f $weights/calibration.json ]] ||
   ffhnet calibrate "$weights" --objects procedural-val:144,varied-val:64 --fit 64 --views 2
-evaluate kit_test --objects KIT --placements 25 --poses all --executed 40 --stress --seed "$seed"
+evaluate kit_test --objects "$shared/meshes/kit_test" --placements 25 --poses all --executed 40 --stress --seed "$seed"
 few=(--placements 2 --poses all --executed 40 --full-views 0 --seed "$seed")
 evaluate procedural_test --objects procedural-test:24 "${few[@]}" --stress
 evaluate varied_test --objects varied-test:24 "${few[@]}" --heuristic 0
@@ -25,7 +25,7 @@ for set in ycb gso contactdb hope; do
   [[ -d $out/scans/$set ]] || ffhnet objects import "$shared/meshes/$set" --out "$out/scans/$set"
   evaluate scans_$set --objects "$out/scans/$set" "${few[@]}" --heuristic 0
 done
-evaluate kit_test_density_100 --objects KIT --placements 6 --poses all --executed 60 --full-views 0 --strict \
+evaluate kit_test_density_100 --objects "$shared/meshes/kit_test" --placements 6 --poses all --executed 60 --full-views 0 --strict \
   --density 100 --seed $((seed + 1))
 python benchmarks/captures.py "$shared/captures" --weights "$weights" --json "$out/captures.json"
 evaluate arm --protocol arm --objects procedural-test:200 --placements 1 --seed "$seed"
