@@ -52,6 +52,7 @@ NAMES = {
     "MESHES": "meshes",
     "DIR": "meshes",
     "data/train?": "tiny",
+    "data/train[0-6]": "tiny",
     "data/val0": "tiny",
     "data/shadow": "shadow_data",
     "my_weights": "shadow_weights",
