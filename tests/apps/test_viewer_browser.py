@@ -78,9 +78,10 @@ def hand_pixels(viewer):
 
 
 def pixels_that(fit, viewer):
-    """The first count of `hand_pixels` that fits; the browser may still draw what the panel already says."""
-    end = time.monotonic() + PATIENCE
-    while not fit(count := hand_pixels(viewer)) and time.monotonic() < end:
+    """The first `hand_pixels` that fit, twice in a row: the browser still draws what the panel says."""
+    end, last = time.monotonic() + PATIENCE, -1
+    while not (fit(count := hand_pixels(viewer)) and count == last) and time.monotonic() < end:
+        last = count
         time.sleep(0.2)
     return count
 
