@@ -11,7 +11,8 @@ import tyro
 
 from ffhnet.apps.console import absent
 from ffhnet.apps.extras import require_sim
-from ffhnet.errors import OptionError, WeightsError
+from ffhnet.apps.trained_flow import check_size, load_flow
+from ffhnet.errors import OptionError
 
 if TYPE_CHECKING:
     from ffhnet.model.config import ModelConfig
@@ -51,25 +52,22 @@ def run(options: DistilOptions) -> None:
     import torch
 
     from ffhnet.dataset.records import read_training_data
-    from ffhnet.model.checkpoint import load_checkpoint
-    from ffhnet.model.flow import FlowGenerator
     from ffhnet.training import distill_evaluator, distill_generator
     from ffhnet.training.processes import joined
 
-    if options.threads < 1 or (options.steps is not None and options.steps < 1) or options.guidance < 0:
-        raise OptionError("--threads and --steps must be at least 1, --guidance at least 0")
+    check_size(options.threads, options.steps)
+    if options.guidance < 0:
+        raise OptionError(f"wanted --guidance at least 0, got {options.guidance}")
     torch.set_num_threads(options.threads)
-    trained = load_checkpoint(options.weights)
+    trained, flow = load_flow(options.weights)
     info = trained.info
-    if not isinstance(trained.generator, FlowGenerator):
-        raise WeightsError(f"wanted weights with a flow, {options.weights} holds a {info.model.generator}")
     first, second = _config(options, "generator", info.model), _config(options, "evaluator", info.model)
     data = read_training_data(list(options.data))
     val = None if options.val is None else read_training_data([options.val])
     limits = (info.joint_lower, info.joint_upper)
     with joined(options.device) as processes:
         student = distill_generator(
-            data, val, first, options.out, limits, trained.generator, trained.evaluator, processes=processes
+            data, val, first, options.out, limits, flow, trained.evaluator, processes=processes
         )
         distill_evaluator(
             data, val, second, options.out, limits, trained.evaluator, student, processes=processes

@@ -11,7 +11,8 @@ import tyro
 
 from ffhnet.apps.console import absent
 from ffhnet.apps.extras import require_sim
-from ffhnet.errors import OptionError, WeightsError
+from ffhnet.apps.trained_flow import check_size, load_flow
+from ffhnet.errors import OptionError
 
 
 @dataclass(frozen=True)
@@ -51,20 +52,16 @@ def run(options: RefineOptions) -> None:
     import torch
 
     from ffhnet.dataset.records import read_training_data
-    from ffhnet.model.checkpoint import load_checkpoint, save_checkpoint
-    from ffhnet.model.flow import FlowGenerator
+    from ffhnet.model.checkpoint import save_checkpoint
     from ffhnet.training import TrainingConfig, refine_generator
     from ffhnet.training.processes import joined
 
-    if options.threads < 1 or (options.steps is not None and options.steps < 1):
-        raise OptionError("--threads and --steps must be at least 1")
+    check_size(options.threads, options.steps)
     if options.belief is not None and not 0 <= options.belief < float("inf"):
         raise OptionError(f"--belief is a power of at least 0, got {options.belief}")
     torch.set_num_threads(options.threads)
-    trained = load_checkpoint(options.weights)
+    trained, flow = load_flow(options.weights)
     info = trained.info
-    if not isinstance(trained.generator, FlowGenerator):
-        raise WeightsError(f"wanted weights with a flow, {options.weights} holds a {info.model.generator}")
     if options.out.resolve() == options.weights.resolve():
         raise OptionError("--out must be another folder than --weights")
     preset = TrainingConfig.refinement(info.model)
@@ -82,9 +79,7 @@ def run(options: RefineOptions) -> None:
     val = None if options.val is None else read_training_data([options.val])
     limits = (info.joint_lower, info.joint_upper)
     with joined(options.device) as processes:
-        refine_generator(
-            data, val, config, options.out, limits, trained.generator, trained.evaluator, processes=processes
-        )
+        refine_generator(data, val, config, options.out, limits, flow, trained.evaluator, processes=processes)
         if processes.first:
             judge = {name: run for name, run in info.training.items() if name == "evaluator"}
             described = dataclasses.replace(info, model=model, training=judge)

@@ -12,7 +12,7 @@ import tyro
 from ffhnet.apps.console import absent, print_table
 from ffhnet.apps.extras import require_sim
 from ffhnet.apps.hand_option import HandOption, for_workers
-from ffhnet.errors import OptionError
+from ffhnet.apps.trained_flow import check_size
 
 if TYPE_CHECKING:
     from ffhnet.hands.link_points import LinkPoints
@@ -94,8 +94,7 @@ def _train(options: TrainOptions, processes: Processes) -> None:
     from ffhnet.model.checkpoint import read_info
     from ffhnet.training import LookPoints, train_evaluator, train_generator
 
-    if options.threads < 1 or (options.steps is not None and options.steps < 1):
-        raise OptionError("--threads and --steps must be at least 1")
+    check_size(options.threads, options.steps)
     torch.set_num_threads(options.threads)
     data = read_training_data(list(options.data))
     val = None if options.val is None else read_training_data([options.val])

@@ -39,10 +39,8 @@ class Cells:
         nx, ny, nz = (int(n) for n in bounding_box(cells)[1] + border + 1)
         keys = (cells[:, 0] * ny + cells[:, 1]) * nz + cells[:, 2]
         # As `np.unique`, without sorting: of the points of a cell the last one stays.
-        number, rows = (
-            np.zeros(nx * ny * nz, dtype=np.int32),
-            np.arange(len(points), dtype=np.int32),
-        )
+        number = np.zeros(nx * ny * nz, dtype=np.int32)
+        rows = np.arange(len(points), dtype=np.int32)
         number[keys] = rows
         source = np.flatnonzero(number[keys] == rows)
         number[keys[source]] = np.arange(1, len(source) + 1)

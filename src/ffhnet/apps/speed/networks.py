@@ -88,7 +88,7 @@ def measure_networks(
 ) -> tuple[dict[str, Times], dict[str, Any]]:
     """Times of all ways, and figures of the contract: medians, factors, the largest difference."""
     engines = {"engine": Engine(checkpoint), "realtime": Engine(realtime)}
-    if has_reduced(checkpoint):
+    if has_reduced(checkpoint.info.model):
         engines["reduced"] = Engine(checkpoint, "reduced")
     ways = {
         "published": published(objects, num),
@@ -116,9 +116,8 @@ def measure_networks(
     return times, figures
 
 
-def has_reduced(checkpoint: Checkpoint) -> bool:
+def has_reduced(config: ModelConfig) -> bool:
     """Whether reduced precision makes a difference for a generator on this processor."""
-    config = checkpoint.info.model
     width = config.flow_width if config.generator == "flow" else 0
     return product_dtype("reduced", width, torch.device("cpu")) != torch.float32
 

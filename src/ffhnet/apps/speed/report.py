@@ -85,7 +85,7 @@ def _perception(
             "engine": FFHNet.from_pretrained(weights, device="cpu"),
             REALTIME: FFHNet.from_pretrained(REALTIME, device="cpu"),
         }
-        if has_reduced(load_checkpoint(weights)):
+        if has_reduced(networks["engine"].info.model):
             networks["reduced"] = FFHNet.from_pretrained(weights, device="cpu", precision="reduced")
         times = measure_pipeline(networks, options.grasps, clock)
         tracking = measure_tracking(networks, clock)
