@@ -128,6 +128,7 @@ def test_paths_to_failures_count_less(
     task = FlowDistillationTask(
         module, teacher, copy.deepcopy(evaluator), (lower, upper), student, make_world(0), None
     )
+    task.prepare(progress=False)
     states, belief = task._paths
     views, ends = np.arange(20), torch.from_numpy(states[:20, -1]).float()
     raw = teacher.grasps(ends)
@@ -189,6 +190,7 @@ def test_half_of_a_batch_is_rated_by_the_teacher(
     task = EvaluatorDistillationTask(
         Listener(config.model), evaluator, teacher, (lower, upper), config, make_world(0), None
     )
+    task.prepare(progress=False)
     task.loss(0, np.random.default_rng(0))
     (grasps,) = seen
     # The third joint of a trial is its number, in units that no generator meets so exactly.

@@ -87,6 +87,7 @@ def test_own_samples_are_drawn_by_belief_to_a_power(
     task = FlowRefinementTask(
         copy.deepcopy(generator), generator, judge, limits, replace(config, belief=2.0), data, None
     )
+    task.prepare(progress=False)
     states, doubt = task._samples
     raw = generator.grasps(torch.from_numpy(states[:5]).float())
     with torch.inference_mode():

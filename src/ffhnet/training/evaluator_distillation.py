@@ -7,7 +7,6 @@ A large evaluator can be asked about any grasp, without physics, and so about th
 from __future__ import annotations
 
 import dataclasses
-from functools import cached_property
 
 import numpy as np
 import torch
@@ -24,9 +23,7 @@ from ffhnet.training.batches import view_tensors
 from ffhnet.training.config import TrainingConfig
 from ffhnet.training.loop import seeded
 from ffhnet.training.tasks import EvaluatorTask
-
-CHUNK = 64
-"""Views whose grasps the teacher rates at once."""
+from ffhnet.training.view_chunks import view_chunks
 
 HELD_OUT_VIEWS = 128
 """Views of the held-out measurement."""
@@ -44,6 +41,8 @@ class EvaluatorDistillationTask(EvaluatorTask):
         data: views and trials to learn from.
         held_out: others to measure on, or None.
     """
+
+    _samples: tuple[Float[np.ndarray, "V P S"], Float[np.ndarray, "V P 3"]]
 
     def __init__(
         self,
@@ -89,18 +88,16 @@ class EvaluatorDistillationTask(EvaluatorTask):
             self.module.train()
         return {**super().metrics(), "off_teacher": (own - opinion).abs().mean().item()}
 
-    @cached_property
-    def _samples(self) -> tuple[Float[np.ndarray, "V P S"], Float[np.ndarray, "V P 3"]]:
+    def prepare(self, progress: bool) -> None:
         """The generator's states for each view, and what the teacher says of them."""
         count, pairs = self._data.num_views, self.config.pairs
         states = np.empty((count, pairs, self._generator.state_width), np.float16)
         opinions = np.empty((count, pairs, 3), np.float16)
         with torch.inference_mode(), seeded(self.config.seed):
-            for first in range(0, count, CHUNK):
-                views = np.arange(first, min(first + CHUNK, count))
+            for views in view_chunks(count, "samples to rate", progress):
                 parts = self._rate(self._data, views)
                 states[views], opinions[views] = (part.half().cpu().numpy() for part in parts)
-        return states, opinions
+        self._samples = states, opinions
 
     def _rate(
         self, data: TrainingData, views: Int[np.ndarray, " K"]

@@ -11,15 +11,14 @@ that what it says of the samples is worth less.
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from ffhnet.training.judged_flow import CHUNK, JudgedFlow
+from ffhnet.training.judged_flow import JudgedFlow
 from ffhnet.training.loop import seeded
+from ffhnet.training.view_chunks import view_chunks
 
 
 class FlowDistillationTask(JudgedFlow):
@@ -28,6 +27,8 @@ class FlowDistillationTask(JudgedFlow):
     The teacher's number of steps is a multiple of the student's; all processes of a run see all `pairs`; the
     trials of the data are not looked at.
     """
+
+    _paths: tuple[Float[np.ndarray, "V K P S"], Float[np.ndarray, "V P"]]
 
     def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         """Distance to the teacher's states and, after the start, what the evaluator says of the grasps."""
@@ -46,8 +47,7 @@ class FlowDistillationTask(JudgedFlow):
         total = distance + self.config.guidance * blame
         return total, {"loss": total.item(), "distance": distance.item(), "blame": blame.item()}
 
-    @cached_property
-    def _paths(self) -> tuple[Float[np.ndarray, "V K P S"], Float[np.ndarray, "V P"]]:
+    def prepare(self, progress: bool) -> None:
         """P paths for each view (noise, and the teacher at the student's times), and belief in their ends."""
         steps, pairs = self.module.config.flow_steps, self.config.pairs
         every = self._teacher.config.flow_steps // steps
@@ -55,12 +55,11 @@ class FlowDistillationTask(JudgedFlow):
         states = np.empty((count, 1 + steps, pairs, self._teacher.state_width), np.float16)
         belief = np.empty((count, pairs), np.float16)
         with torch.inference_mode(), seeded(self.config.seed):
-            for first in range(0, count, CHUNK):
-                views = np.arange(first, min(first + CHUNK, count))
+            for views in view_chunks(count, "paths of the teacher", progress):
                 objects = self._objects(self._data, views)
                 noise = self._noise(len(views), pairs, self.module.config.temperature)
                 path = list(self._teacher.path(objects, noise))[every - 1 :: every]
                 doubt = self._doubt(objects, self.module.grasps(path[-1]))
                 states[views] = torch.stack([noise, *path], dim=1).half().cpu().numpy()
                 belief[views] = torch.exp(-doubt).half().cpu().numpy()
-        return states, belief
+        self._paths = states, belief

@@ -9,17 +9,16 @@ chosen, not moved by the evaluator's gradient, which would lead to where it errs
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
 from ffhnet.training.batches import BatchMaker
-from ffhnet.training.judged_flow import CHUNK, JudgedFlow
+from ffhnet.training.judged_flow import JudgedFlow
 from ffhnet.training.loop import seeded
 from ffhnet.training.tasks import flow_times
+from ffhnet.training.view_chunks import view_chunks
 
 TEMPERATURE = 1.0
 """Of the flow's own samples: more varied than in use, so that there is something to choose from."""
@@ -30,6 +29,9 @@ OWN_SHARE = 0.6
 
 class FlowRefinementTask(JudgedFlow):
     """Flow matching on the grasps of `JudgedFlow`'s views, those first that its evaluator believes in."""
+
+    _batches: BatchMaker
+    _samples: tuple[Float[np.ndarray, "V P S"], Float[np.ndarray, "V P"]]
 
     def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         """Flow matching loss of one batch, in which each view counts alike."""
@@ -55,22 +57,18 @@ class FlowRefinementTask(JudgedFlow):
         chosen = np.take_along_axis(all_states[views], pick[:, :, None], axis=1)
         return torch.from_numpy(chosen).float().to(self._device)
 
-    @cached_property
-    def _batches(self) -> BatchMaker:
-        """Successes of the data."""
-        return BatchMaker.for_generator(self._data, self.config.min_local_success, self.config.min_margin)
-
-    @cached_property
-    def _samples(self) -> tuple[Float[np.ndarray, "V P S"], Float[np.ndarray, "V P"]]:
-        """P samples of the teacher for each view, and the evaluator's doubt in them."""
+    def prepare(self, progress: bool) -> None:
+        """Batches of the data's successes; P samples of the teacher for each view, and the doubt in them."""
+        self._batches = BatchMaker.for_generator(
+            self._data, self.config.min_local_success, self.config.min_margin
+        )
         count, pairs = self._data.num_views, self.config.pairs
         states = np.empty((count, pairs, self._teacher.state_width), np.float16)
         doubt = np.empty((count, pairs), np.float16)
         with torch.inference_mode(), seeded(self.config.seed):
-            for first in range(0, count, CHUNK):
-                views = np.arange(first, min(first + CHUNK, count))
+            for views in view_chunks(count, "own samples", progress):
                 objects = self._objects(self._data, views)
                 *_, last = self._teacher.path(objects, self._noise(len(views), pairs, TEMPERATURE))
                 states[views] = last.half().cpu().numpy()
                 doubt[views] = self._doubt(objects, self._teacher.grasps(last)).half().cpu().numpy()
-        return states, doubt
+        self._samples = states, doubt

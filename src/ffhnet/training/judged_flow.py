@@ -16,9 +16,6 @@ from ffhnet.training.batches import view_tensors
 from ffhnet.training.config import TrainingConfig
 from ffhnet.training.loop import seeded
 
-CHUNK = 64
-"""Views whose samples a teacher makes at once."""
-
 HELD_OUT_VIEWS, HELD_OUT_GRASPS = 128, 32
 """Size of the held-out measurement."""
 

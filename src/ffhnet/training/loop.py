@@ -79,6 +79,8 @@ def _fit(
     done = unpack_state(processes.broadcast(content), state, identity, module, optimizer)
     log = JsonLog(folder / f"{name}_log.jsonl", done) if processes.first else None
     share = processes.share(config.views) / config.views
+    if done < config.steps:
+        task.prepare(progress)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, disable=not progress) as bar:
         shown = bar.add_task(name, total=config.steps, completed=done)

@@ -34,6 +34,10 @@ class Task(Protocol):
         """The network in training."""
         ...
 
+    def prepare(self, progress: bool) -> None:
+        """What is computed once, before the first step, with a progress bar if asked for."""
+        ...
+
     def loss(self, step: int, rng: np.random.Generator) -> tuple[Tensor, dict[str, float]]:
         """Loss of a fresh batch and its parts for the log; noise comes from torch's global generator."""
         ...
@@ -60,6 +64,9 @@ class _BatchTask:
         if held_out is not None:
             rng = np.random.default_rng(HELD_OUT_SEED)
             self._held_out = held_out.draw(rng, HELD_OUT_VIEWS, HELD_OUT_GRASPS).to(device)
+
+    def prepare(self, progress: bool) -> None:
+        """Nothing: batches come from the data as they are."""
 
     def _draw(self, rng: np.random.Generator) -> Batch:
         return self._batches.draw(rng, self.config.views, self.config.grasps).to(self._device)
