@@ -1,11 +1,13 @@
 """Each reason is given where it holds, and only there."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from feasibility_scenes import box, grasps_from, observe, to_camera, tube
 
 from ffhnet.feasibility.hand_check import HandCheck
-from ffhnet.feasibility.planner import ENOUGH, TEMPERATURES, Planner
+from ffhnet.feasibility.planner import ENOUGH, VARIETY, Planner
 from ffhnet.feasibility.reasons import Reason
 from ffhnet.geometry.rotations import matrix_from_rotation_vector
 from ffhnet.grasps import Grasps
@@ -78,6 +80,7 @@ class Network:
 
     def __init__(self, share):
         self.seeds, self.temperatures, self._share = [], [], share
+        self.info = SimpleNamespace(model=SimpleNamespace(temperature=1.5))
 
     def grasp(self, observation, num, seed, threshold, temperature):
         self.seeds.append(seed)
@@ -89,14 +92,14 @@ class Network:
         return to_camera(batch).ranked()
 
 
-@pytest.mark.parametrize(("share", "batches"), [(0.5, 1), (0.2, 3), (0.0, len(TEMPERATURES))])
+@pytest.mark.parametrize(("share", "batches"), [(0.5, 1), (0.2, 3), (0.0, len(VARIETY))])
 def test_more_are_sampled_where_too_few_are_left(share, batches):
     network = Network(share)
     plan = Planner(network, load_hand()).plan(observe(tube()), num=20)
     assert len(set(network.seeds)) == len(network.seeds) == batches
-    assert tuple(network.temperatures) == TEMPERATURES[:batches]
+    assert network.temperatures == [1.5, 2.0, 2.0, 2.0][:batches]  # 2.4 would be noise
     assert len(plan.grasps) == round(20 * share) * batches
-    assert len(plan.grasps) >= ENOUGH or batches == len(TEMPERATURES)
+    assert len(plan.grasps) >= ENOUGH or batches == len(VARIETY)
     assert plan.counts == ({"table": len(plan.dropped)} if len(plan.dropped) else {})
     assert len(plan.grasps) + len(plan.dropped) == 20 * batches
     assert (np.diff(plan.grasps.score) <= 0).all()

@@ -13,6 +13,7 @@ from ffhnet.grasp_plan import ArmMotion, GraspPlan
 from ffhnet.grasps import Grasps
 from ffhnet.hands import Hand
 from ffhnet.inference.ffhnet import FFHNet
+from ffhnet.model.config import MAX_TEMPERATURE
 from ffhnet.perception.observation import Observation
 from ffhnet.simulation.physics import Physics
 
@@ -22,9 +23,9 @@ if TYPE_CHECKING:
 ENOUGH = 10
 """Feasible grasps after which no more are sampled, and with an arm no more ways are planned."""
 
-TEMPERATURES = (None, 1.0, 1.0, 1.2)
-"""Of the batches of samples after which a scene is given up: first the weights' own, then more varied ones,
-as the grasps that the generator is sure of all hit something."""
+VARIETY = (1.0, 4 / 3, 4 / 3, 1.6)
+"""Factors on the weights' own temperature for the batches of samples after which a scene is given up: then more
+varied ones, as the grasps that the generator is sure of all hit something."""
 
 _BLOCK = 16
 """Grasps for which the arm's ways are planned together."""
@@ -56,14 +57,16 @@ class Planner:
 
         Args:
             observation: what the camera sees.
-            num: grasps to sample at a time, once per entry of `TEMPERATURES` until `ENOUGH` are feasible.
+            num: grasps to sample at a time, once per entry of `VARIETY` until `ENOUGH` are feasible.
             seed: of the samples; the same seed gives the same grasps.
             threshold: grasps below this success probability are left out.
         """
         scene = self._check.look(observation)
         ways = None if self._arm is None else _Ways(self._arm, observation)
         batches, reasons = [], []
-        for batch, temperature in enumerate(TEMPERATURES):
+        own = self._network.info.model.temperature
+        for batch, factor in enumerate(VARIETY):
+            temperature = min(factor * own, MAX_TEMPERATURE)
             grasps = self._network.grasp(observation, num, seed + batch * _NEXT_SEED, threshold, temperature)
             reason = self._check(grasps, scene)
             if ways is not None:
