@@ -24,8 +24,8 @@ ENOUGH = 10
 """Feasible grasps after which no more are sampled, and with an arm no more ways are planned."""
 
 VARIETY = (1.0, 4 / 3, 4 / 3, 1.6)
-"""Factors on the weights' own temperature for the batches of samples after which a scene is given up: then more
-varied ones, as the grasps that the generator is sure of all hit something."""
+"""Factors on the weights' own temperature, one for each batch of samples after which a scene is given up:
+later ones are more varied, as the grasps that the generator is sure of all hit something."""
 
 _BLOCK = 16
 """Grasps for which the arm's ways are planned together."""
