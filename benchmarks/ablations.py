@@ -41,6 +41,7 @@ from ffhnet.inference.ffhnet import FFHNet
 from ffhnet.metrics import wilson_interval
 from ffhnet.model.checkpoint import load_checkpoint, read_info, save_checkpoint
 from ffhnet.model.evaluator import FFHEvaluator
+from ffhnet.model.flow import FlowGenerator
 from ffhnet.objects.catalogue import ObjectSource, resolve_objects
 from ffhnet.simulation.scene import build_scene
 from ffhnet.simulation.trial import GraspTrial
@@ -197,9 +198,11 @@ def train(row: Row, data: TrainingData, folder: Path, steps: int) -> None:
     look = LookPoints(surface_points(hand, config.model.palm_points), links)
     learn = train_evaluator if row.network == "evaluator" else train_generator
     learn(row.data(data), None, config, folder, limits, look)
+    info = read_info(folder)
     if row.network == "generator":
-        info = read_info(folder)
         save_checkpoint(folder, info, evaluator=FFHEvaluator(info.model))
+    else:
+        save_checkpoint(folder, info, generator=FlowGenerator(info.model))
 
 
 def rate(folder: Path, val: TrainingData, own: TrainingData) -> dict[str, Any]:
