@@ -7,7 +7,7 @@ import pytest
 from outcome_makers import condition, view
 
 from ffhnet.evaluation.outcomes import UnseenView
-from ffhnet.evaluation.tables import KEPT_SHARES, make_row, make_table
+from ffhnet.evaluation.tables import KEPT_SHARES, SURE, make_row, make_table
 
 
 @pytest.fixture
@@ -99,6 +99,20 @@ def test_lead_is_over_the_better_control():
     assert nominal.lead.interval.high == pytest.approx(1)
 
 
+def test_the_best_grasp_is_left_out_where_its_score_is_low():
+    weak, strong = condition("friction", top=[0, 1]), condition("friction", top=[1])
+    views = [
+        view("a", [0.9, 0.1], [1, 0], score=[0.8, 0.1], conditions=(condition(top=[1, 0]), weak)),
+        view("a", [0.9], [1], score=[0.3], conditions=(condition(top=[0]), strong)),
+        view("b", [0.9], [1], score=[0.75], conditions=(condition(top=[1]), strong)),
+    ]
+    row = make_row("total", views)
+    assert SURE == (0.25, 0.5, 0.75, 0.9)
+    assert [counts(cell) for cell in row.nominal.sure] == [(2, 3), (2, 2), (2, 2), (0, 0)]
+    assert [counts(cell) for cell in row.conditions[1].sure] == [(2, 3), (1, 2), (1, 2), (0, 0)]
+    assert row.nominal.sure[1].retained == pytest.approx(2 / 3)
+
+
 def test_coverage_is_a_mean_over_objects(table):
     assert table.total.coverage.distinct.value == pytest.approx(4.5)
     assert table.total.coverage.views == 2
@@ -116,6 +130,7 @@ def test_json_follows_the_contract(table):
     assert content["total"]["top1"]["executed"] == 3
     assert set(content["total"]["kept"]) == {str(share) for share in KEPT_SHARES}
     assert content["total"]["conditions"]["nominal"]["blind_short_side"]["executed"] == 3
+    assert set(content["total"]["conditions"]["nominal"]["top1_by_score"]) == {str(score) for score in SURE}
     assert content["unseen_views"] == [{"object": "box", "pose": "lying_0"}]
     assert sum(b["count"] for b in content["evaluator"]["reliability"]) == 8
     low, high = content["total"]["thresholds"]["0.0"]["bootstrap95"]

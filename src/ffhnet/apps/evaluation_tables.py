@@ -6,7 +6,7 @@ import math
 
 from ffhnet.apps.console import print_table
 from ffhnet.evaluation.cells import Cell, Estimate
-from ffhnet.evaluation.tables import SMALL, THRESHOLDS, WORST_SHARE, ConditionCells, Row, Table
+from ffhnet.evaluation.tables import SMALL, SURE, THRESHOLDS, WORST_SHARE, ConditionCells, Row, Table
 
 _BEST = (0.28, 0.05)
 """Kept shares that the paper's thresholds 0.9 and 0.95 came to."""
@@ -20,6 +20,7 @@ def print_evaluation(table: Table) -> None:
         _print_methods,
         _print_shares,
         _print_conditions,
+        _print_sure,
         _print_reliability,
     ):
         show(table)
@@ -108,6 +109,16 @@ def _condition_row(condition: ConditionCells) -> tuple[str, ...]:
     ours = (condition.top1, condition.top, condition.random)
     blind = (condition.blind_random_yaw, condition.blind_short_side)
     return (condition.name, *(_with_interval(cell) for cell in (*ours, *blind)), _points(condition.lead))
+
+
+def _print_sure(table: Table) -> None:
+    columns = ("views", "world", "always", *(f"score {score:g} or more" for score in SURE))
+    rows = []
+    for row in table.parts:
+        for i, condition in enumerate(c for c in row.conditions if c.sure):
+            cells = [f"{_rate(cell)} of {cell.retained:.0%} of the views" for cell in condition.sure]
+            rows.append((row.name if i == 0 else "", condition.name, _rate(condition.top1), *cells))
+    print_table("The best grasp of each view, executed only where its score is high enough", columns, rows)
 
 
 def _print_reliability(table: Table) -> None:

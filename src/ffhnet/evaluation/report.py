@@ -21,8 +21,9 @@ from ffhnet.evaluation.report_cells import (
     points_cell,
     rate_cell,
     series,
+    share_cell,
 )
-from ffhnet.evaluation.tables import SMALL, THRESHOLDS, WORST_SHARE, ConditionCells, Row, Table
+from ffhnet.evaluation.tables import SMALL, SURE, THRESHOLDS, WORST_SHARE, ConditionCells, Row, Table
 
 PAPER_TABLE1 = ((0.61, 0.99), (0.70, 0.87), (0.75, 0.83), (0.82, 0.28), (0.91, 0.05))
 """Success and kept share of the paper's Table I at each of its thresholds (averages of 12 objects)."""
@@ -84,6 +85,7 @@ def report(
         *_kept(results),
         *_calibration(results),
         *_worlds(results),
+        *_sure(results),
         *_strict(results),
         *_poses(results),
         *_worst(results),
@@ -217,6 +219,23 @@ def _worlds(results: Table) -> list[Element]:
             "The same grasps with less friction, twice the mass, a wrong palm pose, and all of it together."
         ),
         *_conditions(conditions, "best 5 of each view"),
+    ]
+
+
+def _sure(results: Table) -> list[Element]:
+    rows = [
+        (
+            _WORLDS.get(condition.name, condition.name),
+            full_cell(condition.top1),
+            *map(share_cell, condition.sure),
+        )
+        for condition in results.total.conditions
+        if condition.sure
+    ]
+    columns = ("world", "always", *(f"score of {score:g} or more" for score in SURE))
+    return [
+        element("h2", "If the hand stays where it is unless the score is high"),
+        table("The best grasp of each view: held of executed.", columns, rows),
     ]
 
 

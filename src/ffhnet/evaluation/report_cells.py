@@ -38,6 +38,14 @@ def rate_cell(cell: Cell) -> str | Element:
     return element("td", percent(cell.rate), element("small", f"{cell.successes}/{cell.kept}"))
 
 
+def share_cell(cell: Cell) -> str | Element:
+    """Rate, counts, and which share of the views that is."""
+    if cell.kept == 0:
+        return "-"
+    counts = f"{cell.successes}/{cell.kept}, {percent(cell.retained)} of the views"
+    return element("td", percent(cell.rate), element("small", counts))
+
+
 def full_cell(cell: Cell) -> str | Element:
     """Rate, counts and interval."""
     interval = shown_interval(cell)

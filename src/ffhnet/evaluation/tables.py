@@ -26,6 +26,9 @@ KEPT_SHARES = (0.83, 0.73, 0.5, 0.28, 0.1, 0.05)
 """What the paper's thresholds 0.5, 0.7, 0.9 and 0.95 kept, and two more: comparable between evaluators, which
 thresholds are not."""
 
+SURE = (0.25, 0.5, 0.75, 0.9)
+"""Scores below which a careful robot might not execute the best grasp of a view."""
+
 WORST_SHARE = 0.28
 """Kept share by which the worst object is told."""
 
@@ -64,6 +67,8 @@ class ConditionCells:
             protocol).
         blind_random_yaw, blind_short_side: the blind controls.
         lead: of top-1 over the better of them, as a share.
+        sure: the first grasps of the views on which its score reaches each of `SURE`, out of all views; empty
+            in the strict protocol, whose first grasp is not the best one.
     """
 
     name: str
@@ -73,11 +78,13 @@ class ConditionCells:
     blind_random_yaw: Cell
     blind_short_side: Cell
     lead: Estimate
+    sure: tuple[Cell, ...]
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
         groups = ("top1", "top", "random", "blind_random_yaw", "blind_short_side", "lead")
-        return {group: getattr(self, group).to_json() for group in groups}
+        sure = {f"{score}": cell.to_json() for score, cell in zip(SURE, self.sure, strict=False)}
+        return {**{group: getattr(self, group).to_json() for group in groups}, "top1_by_score": sure}
 
 
 @dataclass(frozen=True)
@@ -280,6 +287,17 @@ def _condition_cells(objects: list[list[ViewOutcome]], index: int, name: str) ->
         blind_random_yaw=pool(blind[0]),
         blind_short_side=pool(blind[1]),
         lead=_lead(top1, blind),
+        sure=() if index >= len(objects[0][0].conditions) else _sure(objects, index),
+    )
+
+
+def _sure(objects: list[list[ViewOutcome]], index: int) -> tuple[Cell, ...]:
+    """The first grasp in one world, where its score reaches each of `SURE`."""
+    scores = [np.array([view.samples.score[0] for view in views]) for views in objects]
+    first = [Tries.join([view.conditions[index].top[:1] for view in views]) for views in objects]
+    return tuple(
+        pool([count(t[s >= least], total=len(t)) for t, s in zip(first, scores, strict=True)])
+        for least in SURE
     )
 
 
