@@ -47,7 +47,8 @@ class DistanceField(nn.Module):
 
     The vector holds that distance at thousands of random points; at a node it is the value of the plane
     fitted to the nearest of them, which is linear in the vector, so that the whole grid is one fixed sparse
-    matrix. It is right to 2 to 3 mm (root mean square, within 10 cm of the object).
+    matrix. It is right to 2 to 3 mm (root mean square) between 3 and 10 cm from the object, to 4 mm between 1
+    and 3 cm, and on average 6.7 ± 3 mm too far within 1 cm, where the grid blurs the surface.
     """
 
     index: Tensor
