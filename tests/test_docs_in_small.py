@@ -103,7 +103,7 @@ def place(tmp_path_factory):
         patch.chdir(folder)
         few = [word for option, value in FEW["generate"].items() for word in (option, str(value))]
         cli.main(["objects", "import", "meshes", "--out", "my_objects"])
-        cli.main(["generate", "tiny", "--objects", "procedural-val:2", *few, "--count", "2", "--power", "9"])
+        cli.main(["generate", "tiny", "--objects", "procedural-val:2", *few, "--count", "2", "--power", "24"])
         cli.main(["generate", "shadow_data", "--hand", "shadow", *few, "--count", "2", "--power", "9"])
     return folder
 
