@@ -44,6 +44,19 @@ STRESSES = (
 
 
 @dataclass(frozen=True)
+class PoseErrors:
+    """Directions in which palms are off, unit vectors in the world frame, one of each per grasp."""
+
+    shift: Float[np.ndarray, "N 3"]
+    axis: Float[np.ndarray, "N 3"]
+
+    @classmethod
+    def draw(cls, count: int, rng: np.random.Generator) -> PoseErrors:
+        """Evenly over the sphere."""
+        return cls(_directions(count, rng), _directions(count, rng))
+
+
+@dataclass(frozen=True)
 class Groups:
     """The grasps of one view (world frame) that are tried again in other worlds (`Condition`)."""
 
@@ -78,19 +91,30 @@ def try_stressed(
         rng: source of the directions of pose errors.
     """
     grasps = groups.together
-    shift, axis = _directions(len(grasps), rng), _directions(len(grasps), rng)
-    conditions = []
+    errors = PoseErrors.draw(len(grasps), rng)
+    return [
+        groups.split(stress.name, try_in(stress, trial, grasps, T_world_object, errors))
+        for stress in STRESSES
+    ]
+
+
+def try_in(
+    stress: Stress,
+    trial: GraspTrial,
+    grasps: Grasps,
+    T_world_object: Float[np.ndarray, "4 4"],
+    errors: PoseErrors,
+) -> Tries:
+    """What becomes of grasps (world frame) under one stress; leaves `trial` in its nominal world."""
+    moved = grasps.replace(
+        position=grasps.position + stress.position * errors.shift,
+        rotation=matrix_from_rotation_vector(stress.rotation * errors.axis) @ grasps.rotation,
+    )
+    trial.vary(stress.mass, stress.friction)
     try:
-        for stress in STRESSES:
-            trial.vary(stress.mass, stress.friction)
-            moved = grasps.replace(
-                position=grasps.position + stress.position * shift,
-                rotation=matrix_from_rotation_vector(stress.rotation * axis) @ grasps.rotation,
-            )
-            conditions.append(groups.split(stress.name, Tries.of(trial.run(moved, T_world_object))))
+        return Tries.of(trial.run(moved, T_world_object))
     finally:
         trial.vary()
-    return conditions
 
 
 def try_strict(
