@@ -4,7 +4,7 @@
 
 Every trial is under all stresses. Compares the grasp that the weights call best with a random one of the
 first, and with the choice of who knows the outcome of half of the repeats; all are judged by the other half.
-The gap to the last is what ranking the same grasps differently could win, with knowledge that no camera gives.
+The gap to the last is what another ranking of the same grasps could win, with knowledge that no camera gives.
 """
 
 from __future__ import annotations
