@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
-from zlib import crc32
 
 import numpy as np
 import torch
@@ -33,7 +32,6 @@ from ffhnet.dataset.executors import run_jobs
 from ffhnet.dataset.records import PROPOSERS, read_training_data
 from ffhnet.dataset.scoring import score
 from ffhnet.dataset.training_data import TrainingData
-from ffhnet.errors import SceneError
 from ffhnet.hands import load_hand
 from ffhnet.hands.link_points import link_points
 from ffhnet.hands.surface_points import surface_points
@@ -45,7 +43,7 @@ from ffhnet.model.flow import FlowGenerator
 from ffhnet.objects.catalogue import ObjectSource, resolve_objects
 from ffhnet.simulation.scene import build_scene
 from ffhnet.simulation.trial import GraspTrial
-from ffhnet.simulation.views import ViewMaker
+from ffhnet.simulation.views import seeded_views
 from ffhnet.training.config import ClassShares, TrainingConfig
 from ffhnet.training.train import LookPoints, train_evaluator, train_generator
 
@@ -240,13 +238,7 @@ def try_samples(job: SamplesJob) -> tuple[int, int, int]:
     network, obj = load_network(job.weights), job.source.load()
     trial = GraspTrial(build_scene(load_hand(network.info.hand), obj))
     counts = np.zeros(3, dtype=int)
-    for number in range(job.views):
-        rng = np.random.default_rng([SEED, crc32(obj.name.encode()), number])
-        T_world_object = obj.resting_poses[number % len(obj.resting_poses)]
-        try:
-            view = ViewMaker(obj, T_world_object).take(rng)
-        except SceneError:
-            continue
+    for view, T_world_object, rng in seeded_views(obj, job.views, SEED):
         source = torch.Generator().manual_seed(int(rng.integers(2**31)))
         grasps = network.generate(view.observation, job.samples, source)
         results = trial.run(grasps.to_frame(view.T_world_view, "world"), T_world_object)

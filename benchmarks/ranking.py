@@ -11,11 +11,8 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Annotated
-from zlib import crc32
 
 import numpy as np
 import torch
@@ -23,14 +20,14 @@ import tyro
 from jaxtyping import Bool
 
 from ffhnet.apps.console import absent, print_table, progress_bar
-from ffhnet.errors import SceneError
+from ffhnet.dataset.executors import run_jobs
+from ffhnet.evaluation.protocol import load_network
 from ffhnet.evaluation.stress import STRESSES, PoseErrors, try_in
 from ffhnet.hands import load_hand
-from ffhnet.inference import FFHNet
 from ffhnet.objects.catalogue import ObjectSource, resolve_objects
 from ffhnet.simulation.scene import build_scene
 from ffhnet.simulation.trial import GraspTrial
-from ffhnet.simulation.views import ViewMaker
+from ffhnet.simulation.views import seeded_views
 
 ALL = next(stress for stress in STRESSES if stress.name == "all")
 
@@ -55,16 +52,21 @@ class Options:
     """Write the figures to this file."""
 
 
+@dataclass(frozen=True)
+class RankingJob:
+    """One object: a unit of work for a process."""
+
+    source: ObjectSource
+    options: Options
+
+
 def main(options: Options) -> None:
     figures = []
-    with get_context("spawn").Pool(options.workers) as pool:
-        for objects in options.objects.split(","):
-            sources, views = resolve_objects(objects), []
-            with progress_bar(objects, len(sources)) as step:
-                for held in pool.imap(partial(_try_object, options), sources):
-                    views += held
-                    step()
-            figures.append(summary(objects, views))
+    for objects in options.objects.split(","):
+        jobs = [RankingJob(source, options) for source in resolve_objects(objects)]
+        with progress_bar(objects, len(jobs)) as step:
+            results = run_jobs(try_first, jobs, options.workers, step)
+        figures.append(summary(objects, [held for views in results for held in views]))
     columns = tuple(figures[0])
     print_table("Held under all stresses", columns, [[str(v) for v in f.values()] for f in figures])
     if options.json is not None:
@@ -92,23 +94,19 @@ def known_choice(held: Bool[np.ndarray, "R N"]) -> float:
     return float(np.mean([judge[choose.argmax()] for choose, judge in (parts, parts[::-1])]))
 
 
-def _try_object(options: Options, source: ObjectSource) -> list[Bool[np.ndarray, "R N"]]:
+def try_first(job: RankingJob) -> list[Bool[np.ndarray, "R N"]]:
     """What became of the first grasps of each of two views."""
     torch.set_num_threads(1)
-    net, obj = FFHNet.from_pretrained(options.weights, device="cpu"), source.load()
-    trial = GraspTrial(build_scene(load_hand(net.info.hand), obj))
+    options = job.options
+    weights = None if options.weights is None else str(options.weights)
+    network, obj = load_network(weights), job.source.load()
+    trial = GraspTrial(build_scene(load_hand(network.info.hand), obj))
     views: list[np.ndarray] = []
-    for view in range(2):
-        rng = np.random.default_rng([options.seed, crc32(obj.name.encode()), view])
-        T_world_object = obj.resting_poses[view % len(obj.resting_poses)]
-        try:
-            taken = ViewMaker(obj, T_world_object).take(rng)
-        except SceneError:
-            continue
-        first = net.grasp(taken.observation, 400, seed=int(rng.integers(2**31)))[np.arange(options.first)]
-        grasps = first.to_frame(taken.T_world_camera, "world").replace(probability=None)
+    for view, T_world_object, rng in seeded_views(obj, 2, options.seed):
+        ranked = network.grasp(view.observation, 400, seed=int(rng.integers(2**31)))
+        first = ranked[np.arange(options.first)].to_frame(view.T_world_camera, "world")
         tries = [
-            try_in(ALL, trial, grasps, T_world_object, PoseErrors.draw(len(grasps), rng))
+            try_in(ALL, trial, first, T_world_object, PoseErrors.draw(len(first), rng))
             for _ in range(options.repeats)
         ]
         views.append(np.stack([t.success for t in tries]))

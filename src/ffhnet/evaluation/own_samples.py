@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from zlib import crc32
 
 import numpy as np
 import torch
 from jaxtyping import Float
 
-from ffhnet.errors import SceneError
 from ffhnet.hands import load_hand
 from ffhnet.inference.ffhnet import FFHNet
 from ffhnet.inference.novelty import novelty
@@ -20,7 +18,7 @@ from ffhnet.objects.catalogue import ObjectSource
 from ffhnet.simulation.scene import build_scene
 from ffhnet.simulation.trial import GraspTrial
 from ffhnet.simulation.variation import held_under_variation
-from ffhnet.simulation.views import ViewMaker
+from ffhnet.simulation.views import seeded_views
 
 
 @dataclass(frozen=True)
@@ -75,15 +73,8 @@ def try_own_samples(job: OwnSamplesJob) -> list[OwnSamples]:
     torch.set_num_threads(1)
     network, obj = _load_network(job.weights), job.source.load()
     trial = GraspTrial(build_scene(load_hand(job.hand), obj))
-    makers = [ViewMaker(obj, pose) for pose in obj.resting_poses[: job.views]]
     found = []
-    for number in range(job.views):
-        rng = np.random.default_rng([job.seed, crc32(obj.name.encode()), number])
-        T_world_object = obj.resting_poses[number % len(makers)]
-        try:
-            view = makers[number % len(makers)].take(rng)
-        except SceneError:
-            continue
+    for view, T_world_object, rng in seeded_views(obj, job.views, job.seed):
         ranked = network.grasp(view.observation, job.samples, seed=int(rng.integers(2**31)))
         ranked = ranked.to_frame(view.T_world_camera, "world")
         strange = novelty(network.evaluator.condition, view.observation.bps)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from zlib import crc32
 
 import numpy as np
 import trimesh
@@ -72,3 +74,23 @@ class ViewMaker:
                 continue
             return View(observation, T_world_camera)
         raise SceneError(f"{self._name} could not be segmented in {MAX_ATTEMPTS} simulated views")
+
+
+def seeded_views(
+    obj: GraspObject, count: int, seed: int
+) -> Iterator[tuple[View, Float[np.ndarray, "4 4"], np.random.Generator]]:
+    """Random views of an object, its resting poses in turn; one that cannot be taken is left out.
+
+    Yields:
+        The view, the object's pose in the world, and randomness for what is done with it, all decided by
+        seed, name and the number of the view.
+    """
+    makers = [ViewMaker(obj, pose) for pose in obj.resting_poses[:count]]
+    for number in range(count):
+        rng = np.random.default_rng([seed, crc32(obj.name.encode()), number])
+        turn = number % len(makers)
+        try:
+            view = makers[turn].take(rng)
+        except SceneError:
+            continue
+        yield view, obj.resting_poses[turn], rng
