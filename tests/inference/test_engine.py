@@ -34,6 +34,7 @@ CONFIGS = {
     "default": DEFAULT,
     "student": replace(DEFAULT, flow_width=24, flow_blocks=2, flow_steps=2, flow_palm_points=7),
     "other points": replace(DEFAULT, palm_points=13, flow_palm_points=3, flow_steps=3, temperature=0.5),
+    "adams": replace(DEFAULT, flow_solver="adams"),
     "blind flow": replace(DEFAULT, palm_points=0, use_table_height=False, use_joints=False),
     "flow without points": replace(DEFAULT, flow_palm_points=0, judge_robustness=False),
     "links": replace(DEFAULT, links=6, link_points=9),

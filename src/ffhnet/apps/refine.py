@@ -34,6 +34,8 @@ class RefineOptions:
     """Grasps count as the evaluator's belief in them to this power."""
     temperature: Annotated[float | None, absent("SD", "as it was")] = None
     """Standard deviation of the noise from which the new weights sample: what is surer may vary more."""
+    solver: Annotated[Literal["euler", "adams"] | None, absent("NAME", "as it was")] = None
+    """How the new weights go from noise to grasps."""
     steps: Annotated[int | None, absent("N", "the preset's")] = None
     """Optimiser steps."""
     seed: int = 0
@@ -68,6 +70,8 @@ def run(options: RefineOptions) -> None:
     model = info.model
     if options.temperature is not None:
         model = dataclasses.replace(model, temperature=options.temperature)
+    if options.solver is not None:
+        model = dataclasses.replace(model, flow_solver=options.solver)
     config = dataclasses.replace(
         preset,
         model=model,

@@ -14,6 +14,7 @@ from torch.nn import functional
 from ffhnet.geometry.rotations import rotation_from_6d
 from ffhnet.inference.distance_grid import DistanceGrid, PalmReader
 from ffhnet.model.flow import FlowBlock, FlowGenerator
+from ffhnet.model.flow_steps import flow_steps
 from ffhnet.model.tensors import GraspTensors
 
 
@@ -40,9 +41,9 @@ class FlowEngine:
         exact, reduced = (
             [(block, *_products(block, kind)) for block in self._blocks] for kind in (torch.float32, dtype)
         )
-        self._steps = network.config.flow_steps
-        self._products = [exact, *([reduced] * (self._steps - 1))]
-        time = torch.arange(self._steps, device=network.frequency.device) / self._steps
+        self._steps = flow_steps(network.config.flow_steps, network.config.flow_solver)
+        self._products = [exact, *([reduced] * (len(self._steps) - 1))]
+        time = torch.tensor([step.time for step in self._steps], device=network.frequency.device)
         angle = time.unsqueeze(-1) * network.frequency
         self._clock = network.time_layer(torch.cat([angle.sin(), angle.cos()], dim=-1))
         self._modulation_weight = torch.cat([block.modulation.weight for block in self._blocks])
@@ -67,7 +68,7 @@ class FlowEngine:
         embedded = n.object_second(functional.silu(n.object_layer(condition)))
         context = functional.silu(embedded + self._clock)
         modulation = functional.linear(context, self._modulation_weight, self._modulation_bias)
-        scale, shift = modulation.view(self._steps, len(self._blocks), 2, -1).unbind(dim=2)
+        scale, shift = modulation.view(len(self._steps), len(self._blocks), 2, -1).unbind(dim=2)
         scale = scale + 1
         view = FlowView(self._norm_weight * scale, self._norm_bias * scale + shift, grid)
         return partial(self._sample, view)
@@ -80,20 +81,23 @@ class FlowEngine:
         state = seen[:, :width]
         state.copy_(noise)
         hidden = noise.new_empty(num, n.config.flow_width)
-        for step in range(self._steps):
+        before = torch.zeros_like(noise)
+        for step, products, scale, shift in zip(
+            self._steps, self._products, view.scale, view.shift, strict=True
+        ):
             if self._reader is not None and view.grid is not None:
                 pose = state[:, :9] * n.deviation[:9] + n.mean[:9]
                 position = pose[:, 6:] * n.config.position_scale
                 self._reader.write(view.grid, rotation_from_6d(pose[:, :6]), position, seen[:, width:])
             torch.addmm(self._first_bias, seen, self._first_weight.T, out=hidden)
-            for b, (block, first, bias, second) in enumerate(self._products[step]):
-                normed = functional.layer_norm(
-                    hidden, hidden.shape[1:], view.scale[step, b], view.shift[step, b], block.norm.eps
-                )
+            for b, (block, first, bias, second) in enumerate(products):
+                normed = functional.layer_norm(hidden, hidden.shape[1:], scale[b], shift[b], block.norm.eps)
                 inner = functional.silu(functional.linear(normed.to(first.dtype), first, bias), inplace=True)
                 # What the blocks add up stays in full precision.
                 hidden.add_(block.second.bias).add_(functional.linear(inner, second))
-            state.add_(n.head(hidden), alpha=1 / self._steps)
+            velocity = n.head(hidden)
+            state.add_(velocity, alpha=step.now).add_(before, alpha=step.before)
+            before = velocity
         return n.grasps(state.unsqueeze(0))
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 from ffhnet.errors import OptionError
+from ffhnet.model.flow_steps import FlowSolver
 
 if TYPE_CHECKING:
     from ffhnet.hands.link_points import LinkPoints
@@ -50,6 +51,7 @@ class ModelConfig:
         flow_width: width of the flow's blocks.
         flow_blocks: number of them.
         flow_steps: steps from noise to grasp.
+        flow_solver: how they are taken.
         flow_palm_points: how many of the palm points the flow reads, the first ones; all if there are fewer.
     """
 
@@ -77,6 +79,7 @@ class ModelConfig:
     flow_width: int = 384
     flow_blocks: int = 4
     flow_steps: int = 8
+    flow_solver: FlowSolver = "euler"
     flow_palm_points: int = 96
 
     def __post_init__(self) -> None:
@@ -95,6 +98,9 @@ class ModelConfig:
         check_temperature(self.temperature)
         if self.generator not in ("cvae", "flow"):
             raise OptionError(f"the generator is 'cvae' or 'flow', got {self.generator!r}")
+        if self.flow_solver not in get_args(FlowSolver):
+            wanted = " or ".join(repr(solver) for solver in get_args(FlowSolver))
+            raise OptionError(f"flow_solver is {wanted}, got {self.flow_solver!r}")
         if self.pca_components is not None and not 1 <= self.pca_components <= self.bps_size:
             raise OptionError(
                 f"pca_components must lie between 1 and bps_size {self.bps_size}, got {self.pca_components}"
@@ -155,6 +161,7 @@ class ModelConfig:
             flow_width=128,
             flow_blocks=2,
             flow_steps=2,
+            flow_solver="euler",
             flow_palm_points=32,
             inner_width=56,
             width=112,

@@ -18,6 +18,7 @@ from torch.nn import functional
 from ffhnet.geometry.rotations import rotation_from_6d, rotation_to_6d
 from ffhnet.model.condition import ObjectCondition
 from ffhnet.model.config import ModelConfig
+from ffhnet.model.flow_steps import flow_steps
 from ffhnet.model.local_geometry import local_geometry
 from ffhnet.model.tensors import GraspTensors, ObjectTensors
 
@@ -113,7 +114,7 @@ class FlowGenerator(nn.Module):
         return (self._raw(grasps) - self.mean) / self.deviation
 
     def sample(self, objects: ObjectTensors, num: int, source: torch.Generator) -> GraspTensors:
-        """`num` grasps for each view by `flow_steps` Euler steps; joint angles are not clipped.
+        """`num` grasps for each view in `flow_steps` steps; joint angles are not clipped.
 
         Args:
             objects: V views.
@@ -126,10 +127,12 @@ class FlowGenerator(nn.Module):
 
     def path(self, objects: ObjectTensors, noise: Float[Tensor, "V G S"]) -> Iterator[Float[Tensor, "V G S"]]:
         """The states after each of the `flow_steps` steps; the last is a grasp."""
-        view, x, steps = self._look(objects), noise, self.config.flow_steps
-        for step in range(steps):
-            time = torch.full((len(noise),), step / steps, device=noise.device)
-            x = x + self._velocity(view, x, time) / steps
+        view, x, before = self._look(objects), noise, torch.zeros_like(noise)
+        for step in flow_steps(self.config.flow_steps, self.config.flow_solver):
+            time = torch.full((len(noise),), step.time, device=noise.device)
+            velocity = self._velocity(view, x, time)
+            x = x + step.now * velocity + step.before * before
+            before = velocity
             yield x
 
     def grasps(self, x: Float[Tensor, "V G S"]) -> GraspTensors:
