@@ -27,10 +27,12 @@ def test_train_refine_distil_and_grasp(ffhnet, trained, tmp_path, depth_png):
 
     refined = tmp_path / "refined"
     status, _, err = ffhnet(
-        "refine", DATA, "--weights", trained, "--out", refined, "--temperature", 0.9, *FEW
+        *("refine", DATA, "--weights", trained, "--out", refined),
+        *("--temperature", 0.9, "--solver", "adams", *FEW),
     )
     assert (status, err) == (0, "")
-    assert json.loads((refined / "config.json").read_text())["model"]["temperature"] == 0.9
+    model = json.loads((refined / "config.json").read_text())["model"]
+    assert (model["temperature"], model["flow_solver"]) == (0.9, "adams")
     assert (refined / "evaluator.safetensors").read_bytes() == (
         trained / "evaluator.safetensors"
     ).read_bytes()
